@@ -1,0 +1,22 @@
+# Every outside library of the project, in one place. Reasons: docs/dependencies.md.
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(yaml-cpp REQUIRED)
+find_package(nlohmann_json 3.9 REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(PNG REQUIRED)
+find_package(HDF5 REQUIRED COMPONENTS C)
+find_package(Ceres 2 REQUIRED)
+if(EVPOSE_TESTS)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+  enable_testing()
+endif()
+if(EVPOSE_BENCHMARKS)
+  find_package(benchmark REQUIRED)
+endif()
+
+# The distribution's HDF5 and yaml-cpp differ in the targets they offer from release to release: one name for each.
+add_library(evpose_hdf5 INTERFACE)
+target_include_directories(evpose_hdf5 SYSTEM INTERFACE ${HDF5_C_INCLUDE_DIRS})
+target_link_libraries(evpose_hdf5 INTERFACE ${HDF5_C_LIBRARIES})

@@ -1,0 +1,44 @@
+# evpose_module(NAME SOURCES ... [LINKS ...] [PRIVATE_LINKS ...] [TESTS ...])
+#   library evpose_NAME (evpose::NAME); its unit tests, if any, are the program evpose_NAME_test.
+function(evpose_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS;TESTS" ${ARGN})
+  add_library(evpose_${name} STATIC ${ARG_SOURCES})
+  add_library(evpose::${name} ALIAS evpose_${name})
+  target_include_directories(evpose_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(evpose_${name} PUBLIC ${ARG_LINKS} PRIVATE evpose_options ${ARG_PRIVATE_LINKS})
+  target_compile_features(evpose_${name} PUBLIC cxx_std_20)
+  set_target_properties(evpose_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON EXPORT_NAME ${name})
+  set_property(GLOBAL APPEND PROPERTY EVPOSE_MODULES ${name})
+  if(EVPOSE_TESTS AND ARG_TESTS)
+    add_executable(evpose_${name}_test ${ARG_TESTS})
+    target_link_libraries(evpose_${name}_test PRIVATE evpose_${name} evpose_options GTest::gtest_main)
+    gtest_discover_tests(evpose_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+                         PROPERTIES TIMEOUT 300)
+  endif()
+endfunction()
+
+add_library(evpose_options INTERFACE)
+target_compile_options(evpose_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wno-float-conversion -Wnon-virtual-dtor)
+if(EVPOSE_WERROR)
+  target_compile_options(evpose_options INTERFACE -Werror)
+endif()
+if(EVPOSE_NATIVE)
+  target_compile_options(evpose_options INTERFACE -march=native)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  target_compile_options(evpose_options INTERFACE -march=x86-64-v3)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  target_compile_options(evpose_options INTERFACE -march=armv8-a)
+endif()
+if(EVPOSE_SANITIZE)
+  add_compile_options(-fsanitize=${EVPOSE_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${EVPOSE_SANITIZE})
+endif()
+
+# Eigen lays out its small vectors by the instruction set of the *including* file: fix it, so that a consumer
+# compiled for another processor agrees with the library about every struct.
+add_library(evpose_eigen INTERFACE)
+target_link_libraries(evpose_eigen INTERFACE Eigen3::Eigen)
+target_compile_definitions(evpose_eigen INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+set_target_properties(evpose_eigen PROPERTIES EXPORT_NAME eigen)

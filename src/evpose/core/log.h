@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace evpose {
+
+enum class LogLevel { quiet, normal, verbose };
+
+/// Process-wide; the only global of the library. Never called from a hot loop.
+void set_log_level(LogLevel level);
+LogLevel log_level();
+
+/// One line to stderr: "evpose: warning: ..." unless quiet.
+void log_warning(const std::string& message);
+/// One line to stderr, when verbose.
+void log_detail(const std::string& message);
+
+}  // namespace evpose

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "evpose/core/pose.h"
+
+namespace evpose {
+
+enum class Health { waiting, initialising, tracking, degraded, lost };
+const char* to_string(Health health);
+
+/// Wall time of one update by stage, seconds. Filled by the tracker from a clock that the driver hands in;
+/// nothing in the estimate depends on it.
+struct StageTimes {
+  double events_s = 0;    ///< noise filter and time surfaces, of the events since the last update
+  double predict_s = 0;   ///< IMU or constant-velocity propagation
+  double choose_s = 0;    ///< visible set
+  double register_s = 0;  ///< alignment of the points with the field
+  double fuse_s = 0;      ///< Kalman update and judgement
+  double after_newest_event_s() const { return predict_s + choose_s + register_s + fuse_s; }
+};
+
+/// Everything the tracker says about one instant: a row of states.csv.
+struct Update {
+  TimeNs t = 0;
+  Pose T_map_body;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    ///< of the body's origin, map frame, m/s
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< rad/s; without IMU: minus the angular rate
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< m/s^2
+  Matrix6d covariance = Matrix6d::Zero();                ///< of T_map_body: (translation, rotation), m^2, rad^2
+  Health health = Health::waiting;
+  std::string reason;             ///< of the health, in words; set when it changed, else empty
+  bool accepted = false;          ///< the registration passed the innovation gate and was used
+  std::int32_t events_read = 0;   ///< since the last update
+  std::int32_t events_kept = 0;   ///< of these, passed by the noise filter
+  std::int32_t points = 0;        ///< chosen map points
+  std::int32_t points_matched = 0;  ///< of these, with events near by
+  double residual = 0;            ///< root of the mean robust cost over the points, 0..1
+  double innovation = 0;          ///< normalised innovation squared / 6
+  StageTimes times;
+};
+
+}  // namespace evpose

@@ -18,6 +18,16 @@ struct Event {
 };
 static_assert(sizeof(Event) == 8, "an event fits eight bytes");
 
+/// `y` below 32768.
+inline Event make_event(std::uint32_t dt_us, int x, int y, bool on) {
+  Event e{};
+  e.dt_us = dt_us;
+  e.x = static_cast<std::uint16_t>(x);
+  e.y = static_cast<std::uint16_t>(y & 0x7FFF);
+  e.on = on ? 1 : 0;
+  return e;
+}
+
 /// Events in order of time; equal times keep the order of the source.
 struct EventPacket {
   TimeNs base = 0;  ///< time of dt_us == 0, on the recording's clock

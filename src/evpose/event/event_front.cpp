@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/event/event_front.h"
+
+#include <algorithm>
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+namespace {
+constexpr double kLongestBurst_s = 0.1;
+constexpr double kShortestBurst_s = 1e-3;
+}  // namespace
+
+void describe(ConfigTable& table, EventFrontConfig& c) {
+  table.group("filter", c.filter);
+  table.add("burst_px", c.burst_px, "px", "quiet time, as predicted motion, that ends a pixel's burst", {0.01, 100});
+}
+
+EventFront::EventFront(int width, int height, const EventFrontConfig& config)
+    : config_(config), filter_(width, height, config.filter), surface_(width, height) {
+  set_motion(0);
+}
+
+void EventFront::set_motion(double flow_px_per_s) {
+  filter_.set_motion(flow_px_per_s);
+  const double s = flow_px_per_s > 0 ? config_.burst_px / flow_px_per_s : kLongestBurst_s;
+  burst_us_ = static_cast<std::uint32_t>(std::clamp(s, kShortestBurst_s, kLongestBurst_s) * 1e6);
+}
+
+void EventFront::rebase(std::uint32_t shift_us) {
+  filter_.rebase(shift_us);
+  surface_.rebase(shift_us);
+}
+
+void EventFront::take(const EventPacket& packet, std::span<const Event> events) {
+  const int width = surface_.width(), height = surface_.height();
+  for (const Event& e : events) {
+    ++counts_.read;
+    if (e.x >= width || e.y >= height) {
+      ++counts_.outside;
+      continue;
+    }
+    const std::uint32_t stamp = clock_.stamp(packet.time(e), [this](std::uint32_t shift) { rebase(shift); });
+    if (!filter_.keep(e.x, e.y, e.on != 0, stamp)) continue;
+    ++counts_.kept;
+    surface_.insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, stamp, burst_us_);
+  }
+}
+
+}  // namespace evpose

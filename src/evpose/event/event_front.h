@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "evpose/event/event.h"
+#include "evpose/event/noise_filter.h"
+#include "evpose/event/time_surface.h"
+
+namespace evpose {
+
+class ConfigTable;
+
+struct EventFrontConfig {
+  NoiseFilterConfig filter;
+  double burst_px = 1.0;  ///< a quiet time of this much predicted motion ends a pixel's burst, px
+};
+void describe(ConfigTable& table, EventFrontConfig& config);
+
+/// The way of every event: noise filter, then time surface, in one pass.
+class EventFront {
+ public:
+  EventFront(int width, int height, const EventFrontConfig& config);
+
+  /// Takes events of `packet` (a part of it, in order). Events outside the image are counted and left out.
+  void take(const EventPacket& packet, std::span<const Event> events);
+
+  /// Predicted image motion from here on, px/s (a typical one; <= 0: unknown).
+  void set_motion(double flow_px_per_s);
+
+  const TimeSurface& surface() const { return surface_; }
+  /// Stamp on the surface's clock of a time, for reading the surface.
+  std::uint32_t stamp(TimeNs t) const { return clock_.at(t); }
+  const NoiseFilter& filter() const { return filter_; }
+
+  struct Counts {
+    std::int64_t read = 0, kept = 0, outside = 0;
+  };
+  const Counts& counts() const { return counts_; }
+
+ private:
+  void rebase(std::uint32_t shift_us);
+
+  EventFrontConfig config_;
+  StampClock clock_;
+  NoiseFilter filter_;
+  TimeSurface surface_;
+  std::uint32_t burst_us_ = 0;
+  Counts counts_;
+};
+
+}  // namespace evpose

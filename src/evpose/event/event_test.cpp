@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "evpose/event/event_front.h"
+
+namespace evpose {
+namespace {
+
+EventPacket packet(TimeNs base, std::initializer_list<Event> events) { return {base, events}; }
+
+std::vector<std::uint32_t> contents(const EventFront& front) {
+  std::vector<std::uint32_t> out;
+  for (int y = 0; y < front.surface().height(); ++y)
+    for (int x = 0; x < front.surface().width(); ++x)
+      for (Polarity p : {Polarity::off, Polarity::on}) {
+        out.push_back(front.surface().last(x, y, p));
+        out.push_back(front.surface().first(x, y, p));
+      }
+  return out;
+}
+
+EventPacket random_events(int n, unsigned width, unsigned height, unsigned step_us) {
+  std::mt19937 random(3);
+  EventPacket p;
+  std::uint32_t t = 0;
+  for (int i = 0; i < n; ++i) {
+    t += static_cast<std::uint32_t>(random() % (2 * step_us));
+    const int x = static_cast<int>(random() % width), y = static_cast<int>(random() % height);
+    p.events.push_back(make_event(t, x, y, random() % 2 == 1));
+  }
+  return p;
+}
+
+TEST(NoiseFilter, KeepsAnEventOnlyWithARecentNeighbour) {
+  EventFrontConfig config;
+  config.filter.support_min_s = config.filter.support_max_s = 5e-3;
+  EventFront front(20, 20, config);
+  const auto p = packet(kNsPerS, {{0, 5, 5, 1},        // first of all: no support
+                                  {5000, 6, 6, 0},     // neighbour 5 ms ago: kept
+                                  {5001, 5, 5, 1},     // its own pixel does not count, but (6, 6) does
+                                  {9000, 15, 15, 1},   // far from everything
+                                  {20000, 6, 5, 1}});  // neighbours too old
+  front.take(p, p.events);
+  EXPECT_EQ(front.counts().read, 5);
+  EXPECT_EQ(front.counts().kept, 2);
+  EXPECT_NE(front.surface().last(6, 6, Polarity::off), 0u);
+  EXPECT_NE(front.surface().last(5, 5, Polarity::on), 0u);
+  EXPECT_EQ(front.surface().last(15, 15, Polarity::on), 0u);
+}
+
+TEST(NoiseFilter, SamePolarityAsksForTheSamePolarity) {
+  EventFrontConfig config;
+  config.filter.same_polarity = true;
+  EventFront front(20, 20, config);
+  const auto p = packet(0, {{10, 5, 5, 1}, {11, 6, 5, 0}, {12, 5, 6, 1}});
+  front.take(p, p.events);
+  EXPECT_EQ(front.counts().kept, 1);
+  EXPECT_NE(front.surface().last(5, 6, Polarity::on), 0u);
+}
+
+TEST(NoiseFilter, WindowIsALengthInTheImage) {
+  NoiseFilterConfig config;
+  config.support_px = 1;
+  config.support_min_s = 1e-3;
+  config.support_max_s = 1;
+  NoiseFilter filter(10, 10, config);
+  filter.set_motion(100);  // 1 px takes 10 ms
+  filter.keep(4, 4, true, 1000);
+  EXPECT_TRUE(filter.keep(5, 4, true, 11000));
+  EXPECT_FALSE(filter.keep(6, 4, true, 22000));
+}
+
+TEST(NoiseFilter, MasksThePixelThatFiresAlone) {
+  NoiseFilter filter(32, 32, {});
+  std::uint32_t t = 1;
+  for (int i = 0; i < 1000; ++i) {
+    t += 1500;
+    filter.keep(20, 20, true, t);                                     // 667 Hz, alone
+    if (i % 100 == 0) filter.keep(1 + i / 100, 5, true, t);          // a slow edge
+  }
+  ASSERT_EQ(filter.hot_pixels().size(), 1u);
+  EXPECT_EQ(filter.hot_pixels()[0].x, 20);
+  EXPECT_EQ(filter.hot_pixels()[0].y, 20);
+  EXPECT_FALSE(filter.keep(20, 20, true, t + 1));
+  EXPECT_FALSE(filter.keep(21, 20, true, t + 2)) << "a hot pixel supports nobody";
+}
+
+TEST(TimeSurface, BurstKeepsItsFirstEventUntilAQuietTime) {
+  TimeSurface s(4, 4);
+  s.insert(1, 2, Polarity::on, 100, 1000);
+  s.insert(1, 2, Polarity::on, 900, 1000);
+  EXPECT_EQ(s.first(1, 2, Polarity::on), 100u);
+  EXPECT_EQ(s.last(1, 2, Polarity::on), 900u);
+  EXPECT_EQ(s.last(1, 2, Polarity::off), 0u);
+  s.insert(1, 2, Polarity::on, 2000, 1000);
+  EXPECT_EQ(s.first(1, 2, Polarity::on), 2000u);
+}
+
+TEST(EventFront, IsTheSameHoweverThePacketsAreCut) {
+  const EventPacket all = random_events(20000, 40, 30, 30);
+  EventFront whole(40, 30, {}), cut(40, 30, {});
+  whole.take(all, all.events);
+  const std::span<const Event> events(all.events);
+  for (std::size_t i = 0; i < events.size(); i += 137) {
+    // Each piece with a base of its own, as a reader would make it.
+    EventPacket piece;
+    piece.base = all.time(events[i]);
+    for (const Event& e : events.subspan(i, std::min<std::size_t>(137, events.size() - i)))
+      piece.events.push_back(make_event(e.dt_us - events[i].dt_us, e.x, e.y, e.on != 0));
+    cut.take(piece, piece.events);
+  }
+  EXPECT_EQ(whole.counts().kept, cut.counts().kept);
+  EXPECT_EQ(contents(whole), contents(cut));
+}
+
+TEST(EventFront, ClockSurvivesHoursOfData) {
+  EventFront front(10, 10, {});
+  TimeNs t = 1'700'000'000 * kNsPerS;
+  for (int minute = 0; minute < 200; ++minute, t += 60 * kNsPerS) {
+    const auto p = packet(t, {{0, 4, 4, 1}, {500, 5, 4, 1}});
+    front.take(p, p.events);
+    EXPECT_EQ(front.stamp(t + 500 * kNsPerUs), front.surface().last(5, 4, Polarity::on)) << minute;
+  }
+  EXPECT_EQ(front.counts().kept, 200);
+}
+
+TEST(EventFront, EventsOutsideTheImageAreCountedAndLeftOut) {
+  EventFront front(10, 10, {});
+  const auto p = packet(0, {{0, 10, 4, 1}, {1, 4, 10, 1}, {2, 40000, 9, 1}});
+  front.take(p, p.events);
+  EXPECT_EQ(front.counts().outside, 3);
+  EXPECT_EQ(front.counts().kept, 0);
+}
+
+}  // namespace
+}  // namespace evpose

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/event/noise_filter.h"
+
+#include <algorithm>
+
+#include "evpose/core/config.h"
+#include "evpose/event/time_surface.h"
+
+namespace evpose {
+
+void describe(ConfigTable& table, NoiseFilterConfig& c) {
+  table.add("on", c.on, "drop events without a recent event among their 8 neighbours");
+  table.add("support_px", c.support_px, "px", "a neighbour's event supports for this much predicted motion", {0.01, 100});
+  table.add("support_min_s", c.support_min_s, "s", "shortest support window", {1e-5, 10});
+  table.add("support_max_s", c.support_max_s, "s", "longest support window", {1e-5, 10});
+  table.add("same_polarity", c.same_polarity, "only events of the same polarity support each other");
+  table.add("hot_factor", c.hot_factor, "", "unsupported events over the median of active pixels that make a pixel hot",
+            {1, 1e6});
+  table.add("hot_min_events", c.hot_min_events, "1/s", "fewest unsupported events of a hot pixel", {1, 60000});
+}
+
+NoiseFilter::NoiseFilter(int width, int height, const NoiseFilterConfig& config)
+    : config_(config), width_(width), height_(height), stride_(static_cast<std::size_t>(width + 2)) {
+  const std::size_t n = stride_ * static_cast<std::size_t>(height + 2);
+  last_.resize(n);
+  if (config.same_polarity) last_on_.resize(n);
+  seen_.resize(n);
+  unsupported_.resize(n);
+  masked_.resize(n);
+  set_motion(0);
+}
+
+void NoiseFilter::set_motion(double flow_px_per_s) {
+  const double longest = std::max(config_.support_min_s, config_.support_max_s);
+  const double s = flow_px_per_s > 0 ? config_.support_px / flow_px_per_s : longest;
+  support_us_ = static_cast<std::uint32_t>(std::clamp(s, config_.support_min_s, longest) * 1e6);
+}
+
+void NoiseFilter::end_second(std::uint32_t stamp_us) {
+  if (second_end_us_ != 0) {
+    std::vector<std::uint16_t> active;
+    for (const std::uint16_t n : seen_)
+      if (n > 0) active.push_back(n);
+    if (!active.empty()) {
+      const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
+      std::nth_element(active.begin(), middle, active.end());
+      const double limit = std::max<double>(config_.hot_min_events, config_.hot_factor * *middle);
+      for (int y = 0; y < height_; ++y)
+        for (int x = 0; x < width_; ++x) {
+          const std::size_t i = static_cast<std::size_t>(y + 1) * stride_ + static_cast<std::size_t>(x + 1);
+          if (masked_[i] || unsupported_[i] < limit) continue;
+          masked_[i] = 1;
+          last_[i] = 0;  // its past events support nobody
+          if (!last_on_.empty()) last_on_[i] = 0;
+          hot_.push_back({x, y});
+        }
+    }
+  }
+  std::fill(seen_.begin(), seen_.end(), std::uint16_t{0});
+  std::fill(unsupported_.begin(), unsupported_.end(), std::uint16_t{0});
+  second_end_us_ = stamp_us + 1'000'000;
+}
+
+void NoiseFilter::rebase(std::uint32_t shift_us) {
+  rebase_stamps(last_, shift_us);
+  rebase_stamps(last_on_, shift_us);
+  second_end_us_ = second_end_us_ > shift_us ? second_end_us_ - shift_us : 1;
+}
+
+}  // namespace evpose

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/fusion/ekf.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <random>
+
+namespace evpose {
+namespace {
+
+const Eigen::Vector3d kGravity(0, 0, -9.81);
+
+NavState some_state() {
+  NavState s;
+  s.T_map_body = {so3::exp({0.3, -0.2, 1.1}), {1, 2, 3}};
+  s.velocity = {0.5, -1, 0.2};
+  return s;
+}
+
+ImuSample sample(TimeNs t) { return {t, {0.4, -0.7, 1.3}, {1.5, -0.8, 9.2}}; }
+
+/// The error (p, phi, v) of b against a.
+Eigen::Matrix<double, 9, 1> error(const NavState& b, const NavState& a) {
+  Eigen::Matrix<double, 9, 1> e;
+  e << b.T_map_body.minus(a.T_map_body), b.velocity - a.velocity;
+  return e;
+}
+
+TEST(Ekf, CovarianceGrowsAsDifferencesOfTheStrapdownSay) {
+  // With all noise off, P after one long step is F P F^T: check F column by column against perturbed runs.
+  EkfConfig config;
+  config.imu_noise_scale = 1e-2;
+  const ImuNoise silent{0, 0, 0, 0, 1000};
+  const ImuSample a = sample(0), b = sample(5 * kNsPerMs);
+  const auto perturbed_run = [&](int i, double h) {
+    Vector15d d = Vector15d::Zero();
+    d(i) = h;
+    NavState s = some_state();
+    s.T_map_body = s.T_map_body.plus(d.head<6>());
+    s.velocity += d.segment<3>(6);
+    return strapdown(s, a, b, d.segment<3>(9), d.segment<3>(12), kGravity);
+  };
+  Matrix15d F = Matrix15d::Identity();
+  const NavState plain = perturbed_run(0, 0);
+  for (int i = 0; i < 15; ++i) {
+    const double h = 1e-5;
+    F.block<9, 1>(0, i) = (error(perturbed_run(i, h), plain) - error(perturbed_run(i, -h), plain)) / (2 * h);
+  }
+  Ekf ekf(MotionModel::imu, config, silent);
+  ekf.start(0, some_state(), {0, 0, 0});
+  const Matrix15d P = ekf.state().covariance;
+  ekf.predict(a, b);
+  const Matrix15d expected = F * P * F.transpose();
+  const Matrix15d got = ekf.state().covariance;
+  const Vector15d sigma = expected.diagonal().cwiseSqrt();
+  const Matrix15d relative = (got - expected).cwiseQuotient(sigma * sigma.transpose());
+  EXPECT_LT(relative.cwiseAbs().maxCoeff(), 1e-4);
+}
+
+TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
+  ImuNoise noise;
+  noise.accel_density = 0.02;
+  noise.gyro_density = 0.004;
+  noise.accel_walk = noise.gyro_walk = 0;
+  EkfConfig config;
+  config.imu_noise_scale = 1;
+  Ekf ekf(MotionModel::imu, config, noise);
+  ekf.start(0, some_state(), {0, 0, 0});
+  const int steps = 200, runs = 1500;
+  const TimeNs dt = kNsPerMs;
+  NavState truth = some_state();
+  for (int k = 0; k < steps; ++k) {
+    ekf.predict(sample(k * dt), sample((k + 1) * dt));
+    truth = strapdown(truth, sample(k * dt), sample((k + 1) * dt), {0, 0, 0}, {0, 0, 0}, kGravity);
+  }
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](double s) { return Eigen::Vector3d(s * normal(random), s * normal(random), s * normal(random)); };
+  double nees = 0;
+  const Matrix15d P = ekf.state().covariance;
+  const Eigen::LDLT<Eigen::Matrix<double, 9, 9>> solver(P.topLeftCorner<9, 9>());
+  for (int run = 0; run < runs; ++run) {
+    NavState s = some_state();
+    Vector6d d;
+    d << draw(config.start_position_sigma_m), draw(config.start_rotation_sigma_rad);
+    s.T_map_body = s.T_map_body.plus(d);
+    s.velocity += draw(config.start_velocity_sigma_m_s);
+    const Eigen::Vector3d bg = draw(config.start_gyro_bias_sigma_rad_s), ba = draw(config.start_accel_bias_sigma_m_s2);
+    const double rate = std::sqrt(1.0 / to_seconds(dt));
+    for (int k = 0; k < steps; ++k) {
+      ImuSample a = sample(k * dt), b = sample((k + 1) * dt);
+      const Eigen::Vector3d ng = draw(noise.gyro_density * rate), na = draw(noise.accel_density * rate);
+      for (ImuSample* x : {&a, &b}) x->gyro += ng, x->accel += na;
+      s = strapdown(s, a, b, bg, ba, kGravity);
+    }
+    const Eigen::Matrix<double, 9, 1> e = error(s, truth);
+    nees += e.dot(solver.solve(e));
+  }
+  EXPECT_NEAR(nees / runs / 9, 1.0, 0.06);
+}
+
+PoseInformation full_measurement(const Vector6d& offset) {
+  PoseInformation m;
+  Matrix6d A = Matrix6d::Identity();
+  A(0, 4) = 0.3;
+  A(2, 3) = -0.7;
+  m.information = A.transpose() * 1e5 * A;
+  m.vector = m.information * offset;
+  return m;
+}
+
+TEST(Ekf, UpdateIsTheTextbookKalmanUpdate) {
+  Ekf ekf(MotionModel::imu, {}, {});
+  ekf.start(0, some_state(), {0, 0, 0});
+  for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs));
+  const FusionState before = ekf.state();
+  Vector6d z;
+  z << 1e-3, -2e-3, 5e-4, 1e-5, 2e-5, -1e-5;
+  const PoseInformation m = full_measurement(z);
+  const Eigen::Matrix<double, 15, 6> P_x = before.covariance.leftCols<6>();
+  const Matrix6d S = before.pose_covariance() + m.information.inverse();
+  const Eigen::Matrix<double, 15, 6> K = P_x * S.inverse();
+  const Vector15d dx = K * z;
+  const Matrix15d P = before.covariance - K * P_x.transpose();
+  EXPECT_NEAR(ekf.innovation(m), z.dot(S.inverse() * z) / 6, 1e-9);
+  ekf.update(m);
+  EXPECT_LT((ekf.state().nav.T_map_body.minus(before.nav.T_map_body) - dx.head<6>()).norm(), 1e-10);
+  EXPECT_LT((ekf.state().nav.velocity - before.nav.velocity - dx.segment<3>(6)).norm(), 1e-12);
+  EXPECT_LT((ekf.state().gyro_bias - dx.segment<3>(9)).norm(), 1e-12);
+  // Up to the turn of the attitude error's axes, a part of |dphi| / 2.
+  EXPECT_LT((ekf.state().covariance - P).cwiseAbs().maxCoeff(), 1e-4 * P.diagonal().maxCoeff());
+}
+
+TEST(Ekf, SingularMeasurementLeavesTheOtherDirectionsAlone) {
+  Ekf ekf(MotionModel::imu, {}, {});
+  ekf.start(0, some_state(), {0, 0, 0});
+  PoseInformation m;
+  m.information(0, 0) = 1e8;
+  m.vector(0) = 1e8 * 1e-3;
+  const Matrix15d before = ekf.state().covariance;
+  ekf.update(m);
+  EXPECT_LT(ekf.state().covariance(0, 0), 0.01 * before(0, 0));
+  EXPECT_DOUBLE_EQ(ekf.state().covariance(1, 1), before(1, 1));
+  EXPECT_DOUBLE_EQ(ekf.state().nav.T_map_body.p.y(), 2.0);
+}
+
+TEST(Ekf, EmptyMeasurementChangesNothing) {
+  Ekf ekf(MotionModel::imu, {}, {});
+  ekf.start(0, some_state(), {0, 0, 0});
+  const Matrix15d before = ekf.state().covariance;
+  EXPECT_EQ(ekf.innovation({}), 0);
+  ekf.update({});
+  EXPECT_EQ(ekf.state().covariance, before);
+}
+
+TEST(Ekf, ConstantVelocityLearnsTwistFromPosesAlone) {
+  Ekf ekf(MotionModel::constant_velocity, {}, {});
+  NavState nav;
+  const Eigen::Vector3d velocity(0.5, 0, 0.1), rate(0, 0.3, 0.2);
+  ekf.start(0, nav, {0, 0, 0});
+  for (int k = 1; k <= 200; ++k) {
+    const double t = k * 5e-3;
+    ekf.predict(k * 5 * kNsPerMs);
+    const Pose truth{so3::exp(rate * t), velocity * t};
+    PoseInformation m;
+    m.information = 1e8 * Matrix6d::Identity();
+    m.vector = m.information * truth.minus(ekf.state().nav.T_map_body);
+    ekf.update(m);
+  }
+  EXPECT_LT((ekf.state().nav.velocity - velocity).norm(), 2e-3);
+  EXPECT_LT((ekf.angular_rate() - rate).norm(), 2e-3);
+}
+
+}  // namespace
+}  // namespace evpose

@@ -16,7 +16,8 @@ if(EVPOSE_BENCHMARKS)
   find_package(benchmark REQUIRED)
 endif()
 
-# The distribution's HDF5 and yaml-cpp differ in the targets they offer from release to release: one name for each.
+# CMake's own module gives HDF5 as variables in some releases and as targets in others: one name for both.
 add_library(evpose_hdf5 INTERFACE)
 target_include_directories(evpose_hdf5 SYSTEM INTERFACE ${HDF5_C_INCLUDE_DIRS})
 target_link_libraries(evpose_hdf5 INTERFACE ${HDF5_C_LIBRARIES})
+set_target_properties(evpose_hdf5 PROPERTIES EXPORT_NAME hdf5)

@@ -6,7 +6,8 @@ function(evpose_module name)
   add_library(evpose::${name} ALIAS evpose_${name})
   target_include_directories(evpose_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  target_link_libraries(evpose_${name} PUBLIC ${ARG_LINKS} PRIVATE evpose_options ${ARG_PRIVATE_LINKS})
+  target_link_libraries(evpose_${name} PUBLIC ${ARG_LINKS}
+    PRIVATE $<BUILD_INTERFACE:evpose_options> ${ARG_PRIVATE_LINKS})
   target_compile_features(evpose_${name} PUBLIC cxx_std_20)
   set_target_properties(evpose_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON EXPORT_NAME ${name})
   set_property(GLOBAL APPEND PROPERTY EVPOSE_MODULES ${name})
@@ -14,7 +15,7 @@ function(evpose_module name)
     add_executable(evpose_${name}_test ${ARG_TESTS})
     target_link_libraries(evpose_${name}_test PRIVATE evpose_${name} evpose_options GTest::gtest_main)
     gtest_discover_tests(evpose_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT 300)
+                         PROPERTIES TIMEOUT 300 LABELS unit)
   endif()
 endfunction()
 

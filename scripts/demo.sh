@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# From a bare Debian 12 or Ubuntu 22.04 (or newer) to the first report: packages, build, `evpose demo`.
+# Arguments are handed to `evpose demo`.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+cat <<'TEXT'
+evpose demo
+  1. installs the packages that are missing   (first time: about 3 minutes)
+  2. builds the program                       (first time: about 5 minutes on two cores)
+  3. makes a small recording, tracks it and writes a report (about 1 minute)
+No questions will be asked, except for a password if sudo needs one.
+
+TEXT
+
+scripts/packages.sh build
+export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
+command -v ccache >/dev/null || unset CMAKE_C_COMPILER_LAUNCHER CMAKE_CXX_COMPILER_LAUNCHER
+cmake --preset release
+cmake --build --preset release --target evpose
+exec build/release/apps/evpose/evpose demo "$@"

@@ -1,0 +1,78 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# The one list of packages that evpose needs, by their Debian and Ubuntu names, and their installation.
+#   scripts/packages.sh build    to build and run the program
+#   scripts/packages.sh test     the same, and all tests
+# Does nothing when everything is there. Reasons and versions: docs/dependencies.md.
+set -euo pipefail
+
+build=(
+  g++                  # C++20 compiler, 11 or newer
+  cmake                # 3.22 or newer
+  ninja-build          # what the presets build with
+  ccache               # a second build takes seconds
+  libeigen3-dev        # linear algebra
+  libceres-dev         # the reference solver
+  libhdf5-dev          # recordings and maps
+  libyaml-cpp-dev      # calibrations and configuration
+  libcli11-dev         # command line
+  nlohmann-json3-dev   # summary.json
+  libpng-dev           # pictures in the report
+  nodejs npm           # fetch the report's plot library, once, while building
+  ca-certificates      # for npm's https
+)
+test=(
+  libgtest-dev         # unit tests
+  libbenchmark-dev     # speed of the hot kernels
+  python3              # layer and end-to-end tests
+  python3-numpy        # the independent scorer
+  python3-h5py         # makes broken recordings, reads our maps
+  chromium             # draws the report
+  clang-format-14      # pinned: each version formats differently
+  clang-tidy-14        # pinned for the same reason
+)
+
+case "${1:-}" in
+  build) wanted=("${build[@]}") ;;
+  test) wanted=("${build[@]}" "${test[@]}") ;;
+  *) echo "usage: scripts/packages.sh build|test" >&2; exit 2 ;;
+esac
+
+if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+  echo "This is neither Debian nor Ubuntu. Please see to it that these, or what they are called here, are installed:"
+  printf '  %s\n' "${wanted[@]}"
+  exit 0
+fi
+
+installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
+
+missing=()
+for package in "${wanted[@]}"; do
+  # Node may have come from elsewhere; Debian's npm would then pull in a second one.
+  case $package in nodejs | npm) if command -v node >/dev/null && command -v npm >/dev/null; then continue; fi ;; esac
+  installed "$package" || missing+=("$package")
+done
+[ ${#missing[@]} -gt 0 ] || exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "Missing packages, and neither root nor sudo to install them: apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+  echo "Installing needs root: sudo may ask for your password."
+fi
+apt() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null; }
+
+echo "Installing: ${missing[*]}"
+apt update
+available=()
+for package in "${missing[@]}"; do
+  if [ -n "$(apt-cache madison "$package" 2>/dev/null)" ]; then
+    available+=("$package")
+  else
+    echo "Not among this system's packages: $package. Going on without it."
+  fi
+done
+[ ${#available[@]} -eq 0 ] || apt install --yes --no-install-recommends "${available[@]}" >/dev/null

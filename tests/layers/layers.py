@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Holds the modules of src/evpose and the program to their layers: layers.py ROOT
+
+A module includes and links only what stands on a lower line. Outside libraries, files and streams are kept to the
+modules that own them. Prints one line per fault; exit status 1 if there is one.
+"""
+import pathlib
+import re
+import sys
+
+# What each module may see besides itself.
+CORE = {"core"}
+SENSORS = CORE | {"camera", "imu", "event"}
+MAP = SENSORS | {"map"}
+SOLVERS = MAP | {"registration", "fusion"}
+TRACKER = SOLVERS | {"tracker"}
+IO = MAP | {"io"}
+ALL = TRACKER | IO | {"map_build", "sim", "eval", "report", "live", "bench"}
+MAY_SEE = {
+    "core": set(), "camera": CORE, "imu": CORE, "event": CORE, "map": SENSORS,
+    "registration": MAP, "fusion": MAP, "tracker": SOLVERS,
+    "io": MAP, "map_build": IO, "sim": IO, "eval": IO,
+    "report": ALL, "live": ALL, "bench": ALL, "apps": ALL,
+}
+EMBEDDABLE = TRACKER
+
+# Headers of outside libraries, and who may use them.
+FORMATS = {"io", "report", "live", "bench", "apps"}
+OUTSIDE = [
+    ("Ceres", r"ceres/|glog/", {"registration", "fusion"}),
+    ("yaml-cpp", r"yaml-cpp/", FORMATS),
+    ("HDF5", r"hdf5|H5", {"io"}),
+    ("JSON", r"nlohmann/", FORMATS),
+    ("libpng", r"png\.h", FORMATS),
+    ("CLI11", r"CLI/", {"apps"}),
+]
+# Opening files and printing.
+OPENS_FILES = re.compile(r"\b(fopen|freopen|ofstream|ifstream|fstream)\b")
+MAY_OPEN_FILES = {"io"}
+STREAMS = re.compile(r"#include <(iostream|fstream|cstdio|print)>")
+MAY_PRINT_BELOW = {"src/evpose/core/log.cpp"}  # the one place of the library that writes to stderr
+
+OURS = re.compile(r'^\s*#\s*include\s*["<]evpose/([a-z_]+)/')
+RELATIVE = re.compile(r'^\s*#\s*include\s*"(?!evpose/)([^"]+)"')
+THEIRS = re.compile(r"^\s*#\s*include\s*<([^>]+)>")
+LINK = re.compile(r"\bevpose(?:::|_)([a-z_]+)\b")
+COMMENT = re.compile(r"//.*|/\*.*?\*/", re.DOTALL)
+
+
+def modules(root):
+    for folder in sorted((root / "src/evpose").iterdir()):
+        if folder.is_dir():
+            yield folder.name, folder
+    if (root / "apps").is_dir():
+        yield "apps", root / "apps"
+
+
+def is_test(path):
+    return path.stem.endswith("_test")
+
+
+def check_line(module, path, line):
+    """What is wrong with one line of a source, in words."""
+    if match := OURS.match(line):
+        other = match[1]
+        if other != module and other not in MAY_SEE[module]:
+            yield f"{module} must not see {other}"
+    if (match := RELATIVE.match(line)) and module != "apps":
+        yield f'write "evpose/{module}/..." instead of "{match[1]}"'
+    if match := THEIRS.match(line):
+        for name, pattern, users in OUTSIDE:
+            if re.match(pattern, match[1]) and module not in users:
+                yield f"{module} must not use {name}"
+    if is_test(path):
+        return
+    if OPENS_FILES.search(COMMENT.sub("", line)) and module not in MAY_OPEN_FILES:
+        yield f"{module} must not open files: that is io's work"
+    if module in EMBEDDABLE and STREAMS.search(line):
+        yield f"{module} must not print or read streams"
+
+
+def check_sources(root, module, folder):
+    for path in sorted(folder.rglob("*")):
+        if path.suffix not in (".h", ".cpp"):
+            continue
+        name = path.relative_to(root).as_posix()
+        if name in MAY_PRINT_BELOW:
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            for fault in check_line(module, path, line):
+                yield f"{name}:{number}: {fault}"
+
+
+def check_links(root, module, folder):
+    for path in sorted(folder.rglob("CMakeLists.txt")):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            for other in LINK.findall(line.split("#")[0]):
+                if other in MAY_SEE and other != module and other not in MAY_SEE[module]:
+                    yield f"{path.relative_to(root)}:{number}: {module} must not link {other}"
+
+
+def check(root):
+    """All faults of the tree below `root`, as lines of text."""
+    faults = []
+    for module, folder in modules(root):
+        if module not in MAY_SEE:
+            faults.append(f"{folder.relative_to(root)}: unknown module: give it a line in tests/layers/layers.py")
+            continue
+        faults += check_sources(root, module, folder)
+        faults += check_links(root, module, folder)
+    return faults
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    found = check(pathlib.Path(sys.argv[1]).resolve())
+    print("\n".join(found) or "every module keeps to its layer")
+    sys.exit(1 if found else 0)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A tiny healthy recording, made from scratch: a camera that slides along a wall with a grid of edges.
+
+Its parts are plain attributes, so that a test spoils one of them and writes the rest.
+"""
+import pathlib
+
+import numpy as np
+
+WIDTH, HEIGHT, FOCAL = 160, 120, 120.0
+WALL_M = 3.0
+CALIBRATION = f"""cam0:
+  camera_model: pinhole
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [{FOCAL}, {FOCAL}, {(WIDTH - 1) / 2}, {(HEIGHT - 1) / 2}]
+  resolution: [{WIDTH}, {HEIGHT}]
+  T_cam_imu:
+  - [0.0, -1.0, 0.0, 0.0]
+  - [0.0, 0.0, -1.0, 0.0]
+  - [1.0, 0.0, 0.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  timeshift_cam_imu: 0.0
+"""
+IMU_MODEL = """accelerometer_noise_density: 0.002
+accelerometer_random_walk: 0.0003
+gyroscope_noise_density: 0.0004
+gyroscope_random_walk: 2.0e-05
+update_rate: 500.0
+"""
+
+
+def position(t_s):
+    """Of the body in the map: along the wall and up, both smooth; x forward, z up, no rotation."""
+    t_s = np.asarray(t_s, dtype=float)
+    return np.stack([0 * t_s, 0.15 * np.sin(4 * t_s), 1.0 + 0.1 * np.sin(5 * t_s)], axis=-1)
+
+
+def acceleration(t_s):
+    t_s = np.asarray(t_s, dtype=float)
+    return np.stack([0 * t_s, -2.4 * np.sin(4 * t_s), -2.5 * np.sin(5 * t_s)], axis=-1)
+
+
+def wall_contours():
+    """x y z nx ny nz of points each centimetre along a grid of lines on the wall."""
+    along, rows = np.arange(-1.5, 1.5, 0.01), []
+    for offset in np.arange(-1.4, 1.5, 0.4):
+        upright = np.stack([np.full_like(along, WALL_M), np.full_like(along, offset), along + 1], axis=1)
+        level = np.stack([np.full_like(along, WALL_M), along, np.full_like(along, offset + 1)], axis=1)
+        rows.append(np.hstack([upright, np.tile([0.0, 1.0, 0.0], (len(along), 1))]))
+        rows.append(np.hstack([level, np.tile([0.0, 0.0, 1.0], (len(along), 1))]))
+    return np.vstack(rows)
+
+
+class Recording:
+    def __init__(self, duration_s=0.6):
+        self.contours = wall_contours()
+        self.calibration = CALIBRATION
+        self.imu_model = IMU_MODEL
+        self.imu_t_ns = np.arange(0, int(duration_s * 1e9) + 1, 2_000_000)
+        self.imu = np.hstack([np.zeros((len(self.imu_t_ns), 3)),
+                              acceleration(self.imu_t_ns * 1e-9) + [0, 0, 9.81]])
+        self.groundtruth_t_s = np.arange(0, duration_s + 1e-9, 0.01)
+        self.t, self.x, self.y, self.p = self._events(duration_s)
+
+    def _events(self, duration_s):
+        """An event where a contour point enters a pixel: enough for a program that reads, chooses and refuses."""
+        columns, previous = [], None
+        for t_us in range(0, int(duration_s * 1e6), 500):
+            in_body = self.contours[:, :3] - position(t_us * 1e-6)
+            x = np.rint((WIDTH - 1) / 2 - FOCAL * in_body[:, 1] / in_body[:, 0]).astype(int)
+            y = np.rint((HEIGHT - 1) / 2 - FOCAL * in_body[:, 2] / in_body[:, 0]).astype(int)
+            pixel = np.where((x >= 0) & (x < WIDTH) & (y >= 0) & (y < HEIGHT), y * WIDTH + x, -1)
+            if previous is not None:
+                new = np.unique(pixel[(pixel != previous) & (pixel >= 0)])
+                columns.append(np.stack([np.full_like(new, t_us), new % WIDTH, new // WIDTH, (new // 7) % 2]))
+            previous = pixel
+        return np.hstack(columns)
+
+    def write(self, folder, t_type="i8"):
+        import h5py  # here, so that a test without it can say so
+
+        folder = pathlib.Path(folder)
+        folder.mkdir(parents=True)
+        with h5py.File(folder / "events.h5", "w") as file:
+            for name, values, kind in (("t", self.t, t_type), ("x", self.x, "u2"), ("y", self.y, "u2"),
+                                       ("p", self.p, "u1")):
+                file.create_dataset(f"events/{name}", data=np.asarray(values).astype(kind), chunks=(65536,),
+                                    maxshape=(None,))
+            file.attrs["width"], file.attrs["height"] = np.uint32(WIDTH), np.uint32(HEIGHT)
+        lines = ["#timestamp_ns,wx,wy,wz,ax,ay,az"]
+        lines += [f"{t}," + ",".join(f"{value:.7f}" for value in row) for t, row in zip(self.imu_t_ns, self.imu)]
+        (folder / "imu.csv").write_text("\n".join(lines) + "\n")
+        lines = [f"{t:.9f} " + " ".join(f"{value:.9f}" for value in position(t)) + " 0 0 0 1"
+                 for t in self.groundtruth_t_s]
+        (folder / "groundtruth.tum").write_text("\n".join(lines) + "\n")
+        (folder / "camchain-imucam.yaml").write_text(self.calibration)
+        (folder / "imu.yaml").write_text(self.imu_model)
+        self.write_contours(folder / "contours.ply")
+        return folder
+
+    def write_contours(self, path):
+        header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(self.contours)}"]
+        header += [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")] + ["end_header\n"]
+        pathlib.Path(path).write_bytes("\n".join(header).encode() + self.contours.astype("<f4").tobytes())

@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line explains itself and refuses what it does not know. usage_test.py EVPOSE"""
+import re
+import subprocess
+import sys
+import unittest
+
+EVPOSE = None
+
+
+def run(*words):
+    return subprocess.run([EVPOSE, *words], capture_output=True, text=True, timeout=30, stdin=subprocess.DEVNULL)
+
+
+class UsageTest(unittest.TestCase):
+    def test_help_names_every_command_and_each_has_its_own(self):
+        text = run("--help").stdout
+        commands = re.findall(r"^  ([a-z]+)  ", text.split("Subcommands:")[1], re.MULTILINE)
+        self.assertLessEqual({"demo", "track", "eval"}, set(commands))
+        for command in commands:
+            with self.subTest(command=command):
+                result = run(command, "--help")
+                self.assertEqual(result.returncode, 0)
+                self.assertIn("--help", result.stdout)
+
+    def test_version_is_three_numbers(self):
+        self.assertRegex(run("--version").stdout, r"^evpose \d+\.\d+\.\d+\n$")
+
+    def test_wrong_usage_is_status_2_and_one_line(self):
+        for words in ([], ["trakc"], ["track"], ["track", "--no-such-option"], ["eval", "one"],
+                      ["eval", "a.tum", "b.tum", "--align", "sideways"]):
+            with self.subTest(words=words):
+                result = run(*words)
+                self.assertEqual(result.returncode, 2)
+                self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+                self.assertTrue(result.stderr.startswith("evpose: "), result.stderr)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    EVPOSE = sys.argv.pop(1)
+    unittest.main()

@@ -30,11 +30,12 @@ class Camera {
   virtual ~Camera() = default;
 
   /// Pixel of a point in the camera frame (metres), or nothing outside the model's valid domain: behind the
-  /// camera, or beyond valid_angle(). The pixel may lie outside the image. `jacobian`: d pixel / d point.
+  /// camera, or beyond valid_angle(). The pixel may lie outside the image. `jacobian`: d pixel / d point
+  /// (px/m).
   virtual std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_cam,
                                                  Matrix23d* jacobian = nullptr) const = 0;
 
-  /// Unit ray through a pixel, or nothing if no ray inside the valid domain projects there.
+  /// Unit ray that projects to within 1e-9 px of the pixel, or nothing if none in the valid domain does.
   virtual std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const = 0;
 
   /// Largest angle from the optical axis, rad, up to which projection is one-to-one.
@@ -43,7 +44,7 @@ class Camera {
   virtual ImageSize size() const = 0;
   /// Pixels per radian at the image centre.
   virtual double focal_px() const = 0;
-  /// Kalibr's words, e.g. "pinhole-radtan", "pinhole-equidistant".
+  /// Kalibr's words: "pinhole-radtan", "pinhole-equidistant", "pinhole-none".
   virtual std::string model() const = 0;
 };
 
@@ -55,8 +56,8 @@ struct CameraIntrinsics {
   ImageSize size;
 };
 
-/// Errors: non-positive size or focal length, non-finite numbers, wrong count or unknown model, or a distortion
-/// whose one-to-one domain does not reach the image's centre region.
+/// Errors: non-positive size or focal length, non-finite numbers, wrong count or unknown model, or a
+/// distortion whose one-to-one domain does not reach the image's centre region.
 Expected<std::shared_ptr<const Camera>> make_camera(const CameraIntrinsics& intrinsics);
 
 }  // namespace evpose

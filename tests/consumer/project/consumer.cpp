@@ -48,12 +48,14 @@ int main() {
   auto tracker = Tracker::create(setup, TrackerConfig{}, start);
   if (!tracker) return std::puts(tracker.error().line().c_str()), 1;
 
-  // Structs with Eigen members cross the border in both directions: any disagreement about their layout shows here.
+  // Structs with Eigen members cross the border in both directions: any disagreement about their layout shows
+  // here.
   int updates = 0;
   bool at_start = true;
   (*tracker)->on_update([&](const Update& update) {
     ++updates;
-    at_start = at_start && (update.T_map_body.p - start.T_map_body.p).norm() < 0.01 && update.covariance(5, 5) > 0;
+    at_start =
+        at_start && (update.T_map_body.p - start.T_map_body.p).norm() < 0.01 && update.covariance(5, 5) > 0;
   });
   EventPacket packet;
   for (std::uint32_t t_us = 0; t_us < 50'000; t_us += 10)

@@ -30,6 +30,7 @@ void EventFront::set_motion(double flow_px_per_s) {
 void EventFront::rebase(std::uint32_t shift_us) {
   filter_.rebase(shift_us);
   surface_.rebase(shift_us);
+  for (FrontEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
 
 void EventFront::take(const EventPacket& packet, std::span<const Event> events) {
@@ -43,6 +44,7 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
     const std::uint32_t stamp = clock_.stamp(packet.time(e), [this](std::uint32_t shift) { rebase(shift); });
     if (!filter_.keep(e.x, e.y, e.on != 0, stamp)) continue;
     ++counts_.kept;
+    kept_.push_back({stamp, e.x, e.y, e.on});
     surface_.insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, stamp, burst_us_);
   }
 }

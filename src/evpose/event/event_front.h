@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "evpose/event/event.h"
 #include "evpose/event/noise_filter.h"
@@ -18,6 +19,14 @@ struct EventFrontConfig {
 };
 void describe(ConfigTable& table, EventFrontConfig& config);
 
+/// An event that passed the filter, on the surface's clock.
+struct FrontEvent {
+  std::uint32_t stamp_us;
+  std::uint16_t x;
+  std::uint16_t y : 15;
+  std::uint16_t on : 1;
+};
+
 /// The way of every event: noise filter, then time surface, in one pass.
 class EventFront {
  public:
@@ -28,6 +37,10 @@ class EventFront {
 
   /// Predicted image motion from here on, px/s (a typical one; <= 0: unknown).
   void set_motion(double flow_px_per_s);
+
+  /// Kept since the last call of forget(), in order of time.
+  std::span<const FrontEvent> kept() const { return kept_; }
+  void forget() { kept_.clear(); }
 
   const TimeSurface& surface() const { return surface_; }
   /// Stamp on the surface's clock of a time, for reading the surface.
@@ -47,6 +60,7 @@ class EventFront {
   NoiseFilter filter_;
   TimeSurface surface_;
   std::uint32_t burst_us_ = 0;
+  std::vector<FrontEvent> kept_;
   Counts counts_;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -24,11 +25,18 @@ struct ContourPoint {
   std::int8_t contrast = 0;                             ///< brightness step when crossing along normal: -1, 0, +1
 };
 
+/// Surfaces that hide contours behind them. Vertices relative to ContourMap::anchor, metres.
+struct TriangleMesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< both sides hide
+};
+
 /// The prior map: contours in the map frame. Coordinates are floats relative to an anchor, so that their
 /// rounding stays below 0.1 mm within 1 km of it.
 struct ContourMap {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< map frame, metres
   std::vector<ContourPoint> points;
+  TriangleMesh occluders;      ///< empty: nothing is hidden
   std::string frame = "map";   ///< name of the map frame
   std::string source;          ///< file it was read from, for messages
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <functional>
+
+#include "commands.h"
+#include "evpose/core/log.h"
+#include "evpose/core/version.h"
+
+int main(int argc, char** argv) {
+  using namespace evpose;
+  CLI::App app{"evpose: where the drone is, from events, IMU and a prior 3D map"};
+  app.set_version_flag("--version", std::string("evpose ") + version());
+  app.require_subcommand(1);
+  app.footer("Exit status: 0 done; 1 ran, but the tracker was lost at the end or a check failed; 2 bad input or usage.");
+  bool verbose = false, quiet = false;
+  app.add_flag("-v,--verbose", verbose, "say more");
+  app.add_flag("-q,--quiet", quiet, "warnings and progress off");
+
+  std::function<int()> run;
+  add_demo(app, run);
+  add_track(app, run);
+  add_eval(app, run);
+  add_info(app, run);
+  add_map(app, run);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);  // --help, --version
+  } catch (const CLI::ParseError& e) {
+    std::fprintf(stderr, "evpose: %s; see evpose --help\n", e.what());
+    return 2;
+  }
+  set_log_level(quiet ? LogLevel::quiet : verbose ? LogLevel::verbose : LogLevel::normal);
+  try {
+    return run();
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "evpose: out of memory; free some or use a smaller map\n");
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "evpose: %s; please report this\n", e.what());
+  }
+  return 2;
+}

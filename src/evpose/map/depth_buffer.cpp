@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map/depth_buffer.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace evpose {
+namespace {
+// A surface hides a point if it is nearer by this length plus this share of the depth.
+constexpr float kSlack_m = 0.03F;
+constexpr float kSlackShare = 0.015F;
+// ... and, in the cells around, by this share: a silhouette close by.
+constexpr float kSilhouetteShare = 0.10F;
+}  // namespace
+
+DepthBuffer::DepthBuffer(const Eigen::Vector2d& tangents, double cell)
+    : tangents_(tangents.cast<float>()),
+      cell_(static_cast<float>(cell)),
+      columns_(static_cast<int>(2 * tangents.x() / cell) + 1),
+      rows_(static_cast<int>(2 * tangents.y() / cell) + 1) {
+  inverse_depth_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+}
+
+void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double near_m) {
+  std::fill(inverse_depth_.begin(), inverse_depth_.end(), 0.0F);
+  const Pose T_cam_map = T_map_cam.inverse();
+  const Eigen::Matrix3f R = T_cam_map.rotation().cast<float>();
+  const Eigen::Vector3f offset = (T_cam_map * map.anchor).cast<float>();
+  vertices_cam_.resize(map.occluders.vertices.size());
+  for (std::size_t i = 0; i < vertices_cam_.size(); ++i) vertices_cam_[i] = R * map.occluders.vertices[i] + offset;
+  for (const auto& t : map.occluders.triangles) {
+    const Eigen::Vector3f corners[3] = {vertices_cam_[t[0]], vertices_cam_[t[1]], vertices_cam_[t[2]]};
+    clip_and_draw(corners, static_cast<float>(near_m));
+  }
+}
+
+void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners, float near_m) {
+  Eigen::Vector3f kept[4];
+  int n = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3f& a = corners[i];
+    const Eigen::Vector3f& b = corners[(i + 1) % 3];
+    if (a.z() >= near_m) kept[n++] = a;
+    if ((a.z() >= near_m) != (b.z() >= near_m)) kept[n++] = a + (near_m - a.z()) / (b.z() - a.z()) * (b - a);
+  }
+  for (int i = 2; i < n; ++i) draw(kept[0], kept[i - 1], kept[i]);
+}
+
+void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c) {
+  // To grid coordinates (cell centres at whole numbers); 1 / z is linear over the grid.
+  for (Eigen::Vector3f* v : {&a, &b, &c}) {
+    const float w = 1 / v->z();
+    *v = {(v->x() * w + tangents_.x()) / cell_ - 0.5F, (v->y() * w + tangents_.y()) / cell_ - 0.5F, w};
+  }
+  const float area = (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
+  if (!(std::abs(area) > 1e-9F)) return;
+  const float dwdx = ((b.z() - a.z()) * (c.y() - a.y()) - (c.z() - a.z()) * (b.y() - a.y())) / area;
+  const float dwdy = ((c.z() - a.z()) * (b.x() - a.x()) - (b.z() - a.z()) * (c.x() - a.x())) / area;
+  if (a.y() > b.y()) std::swap(a, b);
+  if (b.y() > c.y()) std::swap(b, c);
+  if (a.y() > b.y()) std::swap(a, b);
+  const float first_row = std::max(std::ceil(a.y()), 0.0F), last_row = std::min(std::floor(c.y()), static_cast<float>(rows_ - 1));
+  for (float y = first_row; y <= last_row; ++y) {
+    const auto cross = [y](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
+      return p.x() + (q.x() - p.x()) * (y - p.y()) / (q.y() - p.y());
+    };
+    float left = cross(a, c);
+    float right = (y < b.y() || b.y() == c.y()) ? cross(a, b) : cross(b, c);
+    if (a.y() == b.y() && y <= b.y()) right = b.x();
+    if (left > right) std::swap(left, right);
+    const float x0 = std::max(std::ceil(left), 0.0F), x1 = std::min(std::floor(right), static_cast<float>(columns_ - 1));
+    if (!(x0 <= x1)) continue;
+    float w = a.z() + dwdx * (x0 - a.x()) + dwdy * (y - a.y());
+    float* cell = &inverse_depth_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(x0)];
+    for (float x = x0; x <= x1; ++x, ++cell, w += dwdx) *cell = std::max(*cell, w);
+  }
+}
+
+bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
+  const auto z = static_cast<float>(point_cam.z());
+  const int column = static_cast<int>(std::lround((point_cam.x() / point_cam.z() + tangents_.x()) / cell_ - 0.5));
+  const int row = static_cast<int>(std::lround((point_cam.y() / point_cam.z() + tangents_.y()) / cell_ - 0.5));
+  const auto nearest = [&](int c, int r) {
+    if (c < 0 || r < 0 || c >= columns_ || r >= rows_) return 0.0F;
+    return inverse_depth_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
+  };
+  if (nearest(column, row) * (z - kSlack_m - kSlackShare * z) > 1) return true;
+  for (int r = row - 1; r <= row + 1; ++r)
+    for (int c = column - 1; c <= column + 1; ++c)
+      if (nearest(c, r) * (z - kSlack_m - kSilhouetteShare * z) > 1) return true;
+  return false;
+}
+
+}  // namespace evpose

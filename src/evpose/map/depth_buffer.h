@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "evpose/core/pose.h"
+#include "evpose/map/contour_map.h"
+
+namespace evpose {
+
+/// Depth of the nearest surface over a grid of the normalised image plane (x / z, y / z): small, refreshed when
+/// the view has moved, asked for each candidate point (EV-Pose 5.3, "occlusion-aware").
+class DepthBuffer {
+ public:
+  /// Covers |x / z|, |y / z| <= tangents, with square cells of `cell` (tangent units).
+  DepthBuffer(const Eigen::Vector2d& tangents, double cell);
+
+  /// Draws the triangles as seen from the camera; those nearer than `near_m` are cut there.
+  void render(const ContourMap& map, const Pose& T_map_cam, double near_m);
+
+  /// True if a surface stands before the point by more than the slack that the grid and the surfaces' slope
+  /// need. Points beside a much nearer silhouette count as hidden: which of the two an event belongs to is open.
+  bool hides(const Eigen::Vector3d& point_cam) const;
+
+ private:
+  void draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c);
+  void clip_and_draw(const Eigen::Vector3f* corners, float near_m);
+
+  Eigen::Vector2f tangents_;
+  float cell_;
+  int columns_, rows_;
+  std::vector<float> inverse_depth_;   ///< 1 / z of the nearest surface at each cell's centre, 0: none
+  std::vector<Eigen::Vector3f> vertices_cam_;
+};
+
+}  // namespace evpose

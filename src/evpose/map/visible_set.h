@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "evpose/camera/camera.h"
+#include "evpose/core/pose.h"
+#include "evpose/map/contour_map.h"
+#include "evpose/map/depth_buffer.h"
+
+namespace evpose {
+
+class ConfigTable;
+
+/// A map's points sorted into cubes, so that a query touches only the cubes near a view: its cost does not grow
+/// with the map.
+class ContourIndex {
+ public:
+  /// Keeps a reference to `map`. `cube_m`: edge of a cube.
+  explicit ContourIndex(const ContourMap& map, double cube_m = 0.5);
+
+  struct Cube {
+    Eigen::Vector3f centre;          ///< of its points' bounding box, relative to the map's anchor
+    float radius;                    ///< of the sphere around its points, metres
+    std::uint32_t begin, end;        ///< range of order()
+  };
+  const std::vector<Cube>& cubes() const { return cubes_; }
+  /// Point numbers of the map, cube after cube.
+  const std::vector<std::uint32_t>& order() const { return order_; }
+  const ContourMap& map() const { return map_; }
+
+  /// Numbers of the cubes that meet the sphere, ascending. Appended to `out`.
+  void near(const Eigen::Vector3d& centre_map, double radius_m, std::vector<std::uint32_t>& out) const;
+
+ private:
+  using Block = std::int64_t;  ///< key of a block of 8^3 cubes
+  Block block(const Eigen::Vector3f& relative) const;
+  struct BlockRange {
+    Block key;
+    std::uint32_t begin, end;  ///< range of cubes_
+    Eigen::Vector3f centre;
+    float radius;
+  };
+  const ContourMap& map_;
+  float cube_m_;
+  std::vector<Cube> cubes_;
+  std::vector<BlockRange> blocks_;
+  std::vector<std::uint32_t> order_;
+};
+
+struct VisibleSetConfig {
+  double far_m = 40;          ///< points further away are left out
+  double near_m = 0.1;        ///< points nearer are left out
+  int cell_px = 5;            ///< the image is divided into square cells,
+  int per_bin = 1;            ///< ... each gives at most so many points per 45 deg of direction
+  int budget = 3000;          ///< most points in all
+  double margin_px = 12;      ///< points may lie this far outside of the image when chosen
+  double refresh_px = 8;      ///< chosen again when the view has moved by this much
+  bool occlusion = true;      ///< leave out points behind the map's occluders, if it has any
+  double grazing_sin = 0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
+};
+void describe(ConfigTable& table, VisibleSetConfig& config);
+
+/// The points to align: inside the frustum, not hidden, spread evenly over image and direction, the same from update to
+/// update until the view has moved (EV-Pose 5.3, "view-limited, occlusion-aware").
+class VisibleSet {
+ public:
+  VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config);
+
+  /// Point numbers of the map for this pose, in an order that depends on nothing but map, camera and the pose at
+  /// the last refresh.
+  const std::vector<std::uint32_t>& choose(const Pose& T_map_cam);
+
+  /// As of the last call of choose().
+  const std::vector<std::uint32_t>& chosen() const { return points_; }
+
+  /// Visible points at the last refresh, before thinning.
+  std::size_t candidates() const { return candidates_; }
+
+ private:
+  bool moved(const Pose& T_map_cam) const;
+  void refresh(const Pose& T_map_cam);
+
+  const ContourIndex& index_;
+  const Camera& camera_;
+  VisibleSetConfig config_;
+  double cone_cos_, cone_sin_;  ///< of the cone around the optical axis that holds the image
+  Pose T_map_cam_;
+  bool chosen_once_ = false;
+  DepthBuffer depth_;
+  double nearest_m_ = 0;  ///< depth of the nearest chosen point
+  std::size_t candidates_ = 0;
+  std::vector<std::uint32_t> points_, near_cubes_;
+  struct Slot {
+    std::uint32_t priority, point;
+  };
+  std::vector<Slot> slots_;
+};
+
+}  // namespace evpose

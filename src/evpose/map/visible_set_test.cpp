@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map/visible_set.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+
+namespace evpose {
+namespace {
+
+ContourMap random_map(std::size_t n, double half_extent_m) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> u(-1, 1);
+  ContourMap map;
+  map.anchor = {100, -50, 3};
+  for (std::size_t i = 0; i < n; ++i) {
+    ContourPoint p;
+    p.position = Eigen::Vector3f(u(random), u(random), u(random)) * static_cast<float>(half_extent_m);
+    p.tangent = Eigen::Vector3f(u(random), u(random), u(random)).normalized();
+    map.points.push_back(p);
+  }
+  return map;
+}
+
+class VisibleLaws : public ::testing::Test {
+ protected:
+  VisibleLaws() : map_(random_map(20000, 8)), index_(map_) {
+    camera_ = std::move(make_camera({300, 300, 159.5, 119.5, "radtan", {-0.1, 0.02, 0, 0}, {320, 240}})).value();
+    pose_ = {so3::exp({0.3, -0.5, 0.2}), map_.anchor + Eigen::Vector3d(1, 0.5, -2)};
+  }
+  /// By looking at every point.
+  bool in_frustum(std::uint32_t i, const VisibleSetConfig& c) const {
+    const Eigen::Vector3d x = pose_.inverse() * map_.position(i);
+    const auto pixel = camera_->project(x);
+    return pixel && x.z() >= c.near_m && x.norm() <= c.far_m && camera_->size().contains(*pixel, -c.margin_px) &&
+           (pose_.q.conjugate() * map_.points[i].tangent.cast<double>()).cross(x.normalized()).norm() >= c.grazing_sin;
+  }
+  ContourMap map_;
+  ContourIndex index_;
+  std::shared_ptr<const Camera> camera_;
+  Pose pose_;
+};
+
+TEST_F(VisibleLaws, IndexFindsWhatBruteForceFinds) {
+  for (double radius : {0.3, 2.0, 100.0}) {
+    std::vector<std::uint32_t> cubes;
+    index_.near(pose_.p, radius, cubes);
+    std::set<std::uint32_t> found;
+    for (const std::uint32_t c : cubes)
+      for (std::uint32_t k = index_.cubes()[c].begin; k < index_.cubes()[c].end; ++k) found.insert(index_.order()[k]);
+    for (std::uint32_t i = 0; i < map_.points.size(); ++i)
+      if ((map_.position(i) - pose_.p).norm() < radius - 1e-4) {
+        EXPECT_TRUE(found.count(i)) << i;
+      }
+    EXPECT_TRUE(std::is_sorted(cubes.begin(), cubes.end()));
+  }
+}
+
+TEST_F(VisibleLaws, CandidatesAreExactlyTheFrustum) {
+  VisibleSetConfig config;
+  config.far_m = 6;
+  VisibleSet visible(index_, *camera_, config);
+  const auto& chosen = visible.choose(pose_);
+  std::size_t expected = 0;
+  for (std::uint32_t i = 0; i < map_.points.size(); ++i) expected += in_frustum(i, config) ? 1u : 0u;
+  EXPECT_EQ(visible.candidates(), expected);
+  EXPECT_GT(expected, 300u);
+  for (const std::uint32_t i : chosen) EXPECT_TRUE(in_frustum(i, config));
+}
+
+TEST_F(VisibleLaws, NoCellGivesMoreThanItsShareAndTheBudgetHolds) {
+  VisibleSetConfig config;
+  config.per_bin = 1;
+  VisibleSet visible(index_, *camera_, config);
+  std::map<std::pair<int, int>, int> cells;
+  for (const std::uint32_t i : visible.choose(pose_)) {
+    const auto pixel = camera_->project(pose_.inverse() * map_.position(i));
+    ++cells[{static_cast<int>((pixel->x() + config.margin_px) / config.cell_px),
+             static_cast<int>((pixel->y() + config.margin_px) / config.cell_px)}];
+  }
+  for (const auto& [cell, n] : cells) EXPECT_LE(n, 4) << "one for each of four directions";
+  config.budget = 50;
+  VisibleSet small(index_, *camera_, config);
+  EXPECT_EQ(small.choose(pose_).size(), 50u);
+}
+
+TEST_F(VisibleLaws, ChoiceStaysUntilTheViewHasMoved) {
+  VisibleSet visible(index_, *camera_, {});
+  const auto first = visible.choose(pose_);
+  Vector6d step = Vector6d::Zero();
+  step(5) = 0.005;  // 1.5 px
+  EXPECT_EQ(visible.choose(pose_.plus(step)), first);
+  step(5) = 0.2;
+  EXPECT_NE(visible.choose(pose_.plus(step)), first);
+}
+
+TEST_F(VisibleLaws, ChoiceDoesNotDependOnThePast) {
+  VisibleSet fresh(index_, *camera_, {}), travelled(index_, *camera_, {});
+  Pose other = pose_;
+  other.p.x() += 3;
+  travelled.choose(other);
+  EXPECT_EQ(fresh.choose(pose_), travelled.choose(pose_));
+}
+
+TEST_F(VisibleLaws, NothingBehindTheCamera) {
+  ContourMap behind;
+  behind.points.resize(1);
+  behind.points[0].position = {0, 0, -1};
+  behind.points[0].tangent = {1, 0, 0};
+  const ContourIndex index(behind);
+  VisibleSet visible(index, *camera_, {});
+  EXPECT_TRUE(visible.choose(Pose{}).empty());
+}
+
+}  // namespace
+}  // namespace evpose

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/event_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+namespace {
+
+constexpr float kNoRival = 1e9F;
+constexpr double kEdgePrior = 0.5;      // an event in the gate is of the contour rather than clutter
+constexpr double kLeastCurvature = 0.2; // of the soft assignment's, as a share of the weight
+
+}  // namespace
+
+void describe(ConfigTable& table, EventAlignmentConfig& c) {
+  table.add("gate_px", c.gate_px, "px", "events within this plus two sigma belong to a contour", {0.1, 50});
+  table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
+  table.add("shared_sigma_px", c.shared_sigma_px, "px", "error that neighbouring events share", {0, 10});
+  table.add("shared_s", c.shared_s, "s", "how long a shared error lasts", {0, 100});
+  table.add("map_sigma_m", c.map_sigma_m, "m", "error across the contour of map points that state none", {0, 1});
+  table.add("lateness_px", c.lateness_px, "px", "events come so much after the contour", {-1, 1});
+  table.add("lateness_from_px_s", c.lateness_from_px_s, "px/s", "lateness fades out below this flow", {0, 1e4});
+  table.add("strip_px", c.strip_px, "px", "half length along the contour that a sample stands for", {1, 64});
+  table.add("ambiguity_px", c.ambiguity_px, "px", "events between two contours as similarly near as this are left out", {0, 50});
+  table.add("cluster_px", c.cluster_px, "px", "cells whose events share an error, at 640 px width", {4, 4096});
+  table.add("start_caution", c.start_caution, "", "information is divided by 1 + this at the start", {0, 1e6});
+  table.add("start_caution_s", c.start_caution_s, "s", "time constant of the start's caution", {1e-3, 100});
+}
+
+EventAlignment::EventAlignment(ImageSize size, const EventAlignmentConfig& config) : size_(size), config_(config) {
+  claims_.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height), {-1, 0, 0, kNoRival});
+}
+
+double EventAlignment::lateness(double speed_px_s) const {
+  const double fade = std::min(1.0, std::abs(speed_px_s) / std::max(config_.lateness_from_px_s, 1e-9));
+  return std::copysign(config_.lateness_px * fade, speed_px_s);
+}
+
+bool EventAlignment::same_line(const ContourSample& a, const ContourSample& b) const {
+  return std::abs(a.normal_px.dot(b.normal_px)) > 0.98 && std::abs(a.normal_px.dot(b.pixel - a.pixel)) < 0.75;
+}
+
+void EventAlignment::claim_strips(const EventAlignmentProblem& p) {
+  const double half_span_s = 0.5 * p.span_s;
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const ContourSample& s = p.samples[i];
+    const Eigen::Vector2d& n = s.normal_px;
+    // The middle of the way that the contour makes during the span, and half its length.
+    const double middle = -s.speed_px_s * half_span_s + s.curvature_px_s2 * half_span_s * half_span_s;
+    const double reach = gate_px_[i] + std::abs(s.speed_px_s) * half_span_s + 0.5;
+    const double ex = std::abs(n.x()) * reach + std::abs(n.y()) * config_.strip_px;
+    const double ey = std::abs(n.y()) * reach + std::abs(n.x()) * config_.strip_px;
+    const Eigen::Vector2d centre = s.pixel + middle * n;
+    const int x0 = std::max(0, static_cast<int>(std::ceil(centre.x() - ex)));
+    const int x1 = std::min(size_.width - 1, static_cast<int>(std::floor(centre.x() + ex)));
+    const int y0 = std::max(0, static_cast<int>(std::ceil(centre.y() - ey)));
+    const int y1 = std::min(size_.height - 1, static_cast<int>(std::floor(centre.y() + ey)));
+    for (int y = y0; y <= y1; ++y)
+      for (int x = x0; x <= x1; ++x) {
+        const Eigen::Vector2d r = Eigen::Vector2d(x, y) - centre;
+        const double across = std::abs(n.dot(r)), along = std::abs(n.x() * r.y() - n.y() * r.x());
+        if (across > reach || along > config_.strip_px) continue;
+        const auto index = static_cast<std::uint32_t>(y * size_.width + x);
+        Claim& claim = claims_[index];
+        const Claim mine{static_cast<std::int32_t>(i), static_cast<float>(across), static_cast<float>(along), kNoRival};
+        if (claim.sample < 0) {
+          claim = mine;
+          touched_.push_back(index);
+        } else if (same_line(p.samples[static_cast<std::size_t>(claim.sample)], s)) {
+          if (mine.along < claim.along) claim = {mine.sample, mine.distance, mine.along, claim.rival};
+        } else if (mine.distance < claim.distance) {
+          claim = {mine.sample, mine.distance, mine.along, claim.distance};
+        } else {
+          claim.rival = std::min(claim.rival, mine.distance);
+        }
+      }
+  }
+}
+
+void EventAlignment::release_strips() {
+  for (const std::uint32_t index : touched_) claims_[index] = {-1, 0, 0, kNoRival};
+  touched_.clear();
+}
+
+EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
+  const double event_variance = config_.event_sigma_px * config_.event_sigma_px;
+  sigma_px_.resize(p.samples.size());
+  gate_px_.resize(p.samples.size());
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const ContourSample& s = p.samples[i];
+    const double pose_variance = s.jacobian.dot(p.pose_covariance * s.jacobian);
+    sigma_px_[i] = std::sqrt(std::max(0.0, pose_variance) + s.map_sigma_px * s.map_sigma_px);
+    gate_px_[i] = config_.gate_px + 2 * sigma_px_[i];
+  }
+  claim_strips(p);
+  sums_.assign(p.samples.size(), {});
+  for (const FrontEvent& e : p.events) {
+    const Claim& claim = claims_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
+    if (claim.sample < 0 || claim.rival - claim.distance < config_.ambiguity_px) continue;
+    const auto i = static_cast<std::size_t>(claim.sample);
+    const ContourSample& s = p.samples[i];
+    const double age = 1e-6 * (p.now_us - e.stamp_us);
+    const double d = s.normal_px.dot(Eigen::Vector2d(e.x, e.y) - s.pixel) + s.speed_px_s * age -
+                     s.curvature_px_s2 * age * age + lateness(s.speed_px_s);
+    if (std::abs(d) > gate_px_[i]) continue;
+    const double variance = event_variance + sigma_px_[i] * sigma_px_[i];
+    const double edge = kEdgePrior * std::exp(-0.5 * d * d / variance) / std::sqrt(2 * M_PI * variance);
+    const double clutter = (1 - kEdgePrior) / (2 * gate_px_[i]);
+    const double w = edge / (edge + clutter);
+    Sum& sum = sums_[i];
+    sum.weight += w;
+    sum.offset += w * d;
+    sum.square += w * d * d;
+    sum.curvature += w - w * (1 - w) * d * d / variance;
+    ++sum.events;
+  }
+  release_strips();
+
+  // Events of one cell and one 45 deg bin of direction are one cluster.
+  const int cell = std::max(1, config_.cluster_px * size_.width / 640);
+  const int columns = size_.width / cell + 1, rows = size_.height / cell + 1;
+  struct Cluster {
+    double weight = 0, map_variance = 0;
+  };
+  std::vector<Cluster> clusters(static_cast<std::size_t>(columns * rows * 4));
+  const auto cluster_of = [&](const ContourSample& s) {
+    const int cx = std::clamp(static_cast<int>(s.pixel.x()) / cell, 0, columns - 1);
+    const int cy = std::clamp(static_cast<int>(s.pixel.y()) / cell, 0, rows - 1);
+    double angle = std::atan2(s.normal_px.y(), s.normal_px.x());
+    if (angle < 0) angle += M_PI;
+    const int bin = std::min(3, static_cast<int>(angle * (4 / M_PI)));
+    return static_cast<std::size_t>((cy * columns + cx) * 4 + bin);
+  };
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    if (sums_[i].events == 0) continue;
+    Cluster& c = clusters[cluster_of(p.samples[i])];
+    c.weight += sums_[i].weight;
+    c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
+  }
+
+  const double repeats = std::max(1.0, config_.shared_s / std::max(p.span_s, 1e-6));
+  const double caution = 1 + config_.start_caution * std::exp(-p.running_s / config_.start_caution_s);
+  EventAlignmentResult result;
+  double weight = 0, square = 0;
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const Sum& sum = sums_[i];
+    if (sum.events == 0) continue;
+    ++result.matched_samples;
+    result.matched_events += sum.events;
+    weight += sum.weight;
+    square += sum.square;
+    const Cluster& c = clusters[cluster_of(p.samples[i])];
+    const double own = event_variance / c.weight;
+    const double shared =
+        repeats * (config_.shared_sigma_px * config_.shared_sigma_px + c.map_variance / c.weight);
+    const double scale = own / (own + shared) / (event_variance * caution);
+    const Vector6d& J = p.samples[i].jacobian;
+    const double curvature = std::max(sum.curvature, kLeastCurvature * sum.weight);
+    result.information += scale * curvature * J * J.transpose();
+    result.vector -= scale * sum.offset * J;
+  }
+  result.mean_square_px2 = weight > 0 ? square / weight : 0;
+  return result;
+}
+
+}  // namespace evpose

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/registration.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+namespace {
+
+constexpr std::size_t kChunk = 256;       // points per parallel piece; fixes the order of the sums
+constexpr double kMatchedField = 0.3679;  // 1/e: an event at most one time constant ago
+
+/// Sums over points; those of the chunks are added in order.
+struct NormalEquations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+  double cost = 0;
+  int seen = 0, matched = 0;
+
+  void add(const NormalEquations& o) {
+    H += o.H;
+    b += o.b;
+    cost += o.cost;
+    seen += o.seen;
+    matched += o.matched;
+  }
+};
+
+NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationConfig& config, const Pose& T_map_body,
+                           ThreadPool& pool) {
+  const std::size_t n = problem.points.size();
+  std::vector<NormalEquations> partial(ThreadPool::chunks(n, kChunk));
+  const double c2 = config.robust_scale * config.robust_scale;
+  pool.for_chunks(n, kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    NormalEquations& sum = partial[chunk];
+    for (std::size_t i = begin; i < end; ++i) {
+      double r = 0;
+      Vector6d J;
+      if (!evaluate_point(problem, config.kernel, T_map_body, problem.points[i], &r, &J)) continue;
+      ++sum.seen;
+      if (1 - r >= kMatchedField) ++sum.matched;
+      // Tukey's biweight: a point without events (r = 1) says nothing, and neither does its cost's slope.
+      const double inside = std::max(0.0, 1 - r * r / c2);
+      const double weight = inside * inside;
+      sum.cost += c2 / 3 * (1 - inside * inside * inside);
+      sum.H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
+      sum.b -= weight * r * J;
+    }
+  });
+  NormalEquations sum;
+  for (const auto& p : partial) sum.add(p);
+  sum.H.triangularView<Eigen::StrictlyUpper>() = sum.H.transpose();
+  return sum;
+}
+
+double information_scale(const RegistrationConfig& c) { return 1 / (c.noise * c.noise * c.correlated_points); }
+
+void fill(const AlignmentProblem& problem, double scale, const NormalEquations& normal, AlignmentResult* result) {
+  result->information = scale * normal.H;
+  result->vector =
+      scale * normal.b + result->information * result->T_map_body.minus(problem.T_map_body_predicted);
+  result->seen = normal.seen;
+  result->matched = normal.matched;
+  result->cost = normal.seen > 0 ? normal.cost / normal.seen : 0;
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, RegistrationConfig& c) {
+  table.add("solver", c.solver, {{"gauss_newton", Solver::gauss_newton}, {"ceres", Solver::ceres}},
+            "minimiser; ceres is the slow reference");
+  table.add("kernel", c.kernel, {{"bilinear", FieldKernel::bilinear}, {"spline", FieldKernel::spline}},
+            "field between pixels");
+  table.add("decay_px", c.decay_px, "px", "time constant of the field, as predicted motion across the contour", {0.05, 100});
+  table.add("decay_min_s", c.decay_min_s, "s", "shortest time constant", {1e-4, 10});
+  table.add("decay_max_s", c.decay_max_s, "s", "longest time constant", {1e-4, 10});
+  table.add("robust_scale", c.robust_scale, "", "residual (0..1) beyond which Tukey's loss is flat", {0.01, 100});
+  table.add("cell_px", c.cell_px, "px", "points are spread over cells of this size", {4, 4096});
+  table.add("per_bin", c.per_bin, "", "points per cell and 45 deg of direction", {1, 64});
+  table.add("max_iterations", c.max_iterations, "", "most iterations of the minimiser", {1, 100});
+  table.add("converged_px", c.converged_px, "px", "a smaller step ends the iteration", {1e-6, 10});
+  table.add("noise", c.noise, "", "1 sigma of a residual at the optimum", {0.01, 100});
+  table.add("correlated_points", c.correlated_points, "", "so many points share one error", {1, 1e6});
+}
+
+bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const Pose& T_map_body,
+                    const AlignmentPoint& point, double* residual, Vector6d* jacobian) {
+  const Eigen::Matrix3d R_body_map = T_map_body.q.conjugate().toRotationMatrix();
+  const Eigen::Vector3d x_body = R_body_map * (point.position_map - T_map_body.p);
+  const Pose T_cam_body = problem.T_body_cam.inverse();
+  Matrix23d J_pixel;
+  const auto pixel = problem.camera.project(T_cam_body * x_body, &J_pixel);
+  if (!pixel || !problem.camera.size().contains(*pixel)) return false;
+  const FieldSample field = sample_field(problem.surface, *pixel, problem.now_us, point.decay_us, kernel);
+  *residual = 1 - field.value;
+  if (jacobian != nullptr) {
+    // Only the slope across the contour carries information; along it lies texture.
+    const double slope = field.gradient.dot(point.normal_px);
+    const Eigen::RowVector3d A = -slope * point.normal_px.transpose() * J_pixel * T_cam_body.rotation();
+    // x_body = R^T (X - p): d/dp = -R^T; d/dphi = [x_body]x.
+    jacobian->head<3>() = (-A * R_body_map).transpose();
+    jacobian->tail<3>() = (A * so3::hat(x_body)).transpose();
+  }
+  return true;
+}
+
+AlignmentResult align(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool) {
+  if (config.solver == Solver::ceres) return align_ceres(problem, config);
+  AlignmentResult result;
+  Pose pose = problem.T_map_body_predicted;
+  const double scale = information_scale(config);
+  const auto total_cost = [&](const NormalEquations& n, const Pose& at) {
+    const Vector6d d = at.minus(problem.T_map_body_predicted);
+    return scale * n.cost + d.dot(problem.prior_information * d);
+  };
+  NormalEquations normal = accumulate(problem, config, pose, pool);
+  double cost = total_cost(normal, pose);
+  double damping = 1e-4;
+  const double pixels_per_rad = problem.camera.focal_px();
+  for (; result.iterations < config.max_iterations && !result.converged; ++result.iterations) {
+    const Vector6d d = pose.minus(problem.T_map_body_predicted);
+    Matrix6d H = scale * normal.H + problem.prior_information;
+    H.diagonal() *= 1 + damping;
+    const Vector6d step = H.ldlt().solve(scale * normal.b - problem.prior_information * d);
+    if (!step.allFinite()) break;
+    result.converged = step.tail<3>().norm() * pixels_per_rad < config.converged_px &&
+                       step.head<3>().norm() * pixels_per_rad < config.converged_px;
+    const Pose candidate = pose.plus(step);
+    NormalEquations next = accumulate(problem, config, candidate, pool);
+    const double next_cost = total_cost(next, candidate);
+    if (next_cost <= cost) {
+      pose = candidate;
+      normal = next;
+      cost = next_cost;
+      damping = std::max(damping * 0.1, 1e-6);
+    } else {
+      damping = std::max(damping * 30, 1e-1);
+    }
+  }
+  result.T_map_body = pose;
+  fill(problem, scale, normal, &result);
+  return result;
+}
+
+void evaluate_information(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool,
+                          AlignmentResult* result) {
+  fill(problem, information_scale(config), accumulate(problem, config, result->T_map_body, pool), result);
+}
+
+}  // namespace evpose

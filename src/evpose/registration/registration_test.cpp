@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/registration.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <random>
+
+namespace evpose {
+namespace {
+
+constexpr std::uint32_t kNow = 1'000'000;
+
+/// The contours of a box seen by a camera, and the surface that their motion leaves behind.
+class AlignmentLaws : public ::testing::Test {
+ protected:
+  AlignmentLaws() {
+    camera_ = std::move(make_camera({300, 300, 160, 120, "none", {}, {320, 240}})).value();
+    T_body_cam_ = {so3::exp({0.1, -0.2, 0.05}), {0.05, 0.02, -0.01}};
+    truth_ = Pose{so3::exp({0.2, 0.1, -0.3}), {0.5, -0.2, 0.3}};
+    for (double s = -1; s <= 1; s += 0.02)
+      for (double a : {-0.7, 0.1, 0.8}) {
+        add_line_point({s, a, 3 + 0.3 * a}, Eigen::Vector3d::UnitX());
+        add_line_point({a, s, 4 - 0.5 * a}, Eigen::Vector3d::UnitY());
+      }
+    draw_events();
+  }
+
+  void add_line_point(const Eigen::Vector3d& x_cam, const Eigen::Vector3d& tangent_cam) {
+    const Pose T_map_cam = truth_ * T_body_cam_;
+    Matrix23d J;
+    camera_->project(x_cam, &J);
+    const Eigen::Vector2d along = J * tangent_cam;
+    points_.push_back({T_map_cam * x_cam, Eigen::Vector2d(-along.y(), along.x()).normalized(), 5000});
+    cam_.push_back(x_cam);
+  }
+
+  /// Each contour is a ridge: events now on it, ever older to both sides.
+  void draw_events() {
+    for (int ring = 3; ring >= 0; --ring)
+      for (std::size_t i = 0; i < points_.size(); ++i) {
+        const Eigen::Vector2d u = *camera_->project(cam_[i]);
+        for (double side : {-1.0, 1.0}) {
+          const Eigen::Vector2d at = u + side * ring * points_[i].normal_px;
+          const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
+          if (x < 0 || y < 0 || x >= 320 || y >= 240) continue;
+          surface_.insert(x, y, i % 2 == 0 ? Polarity::on : Polarity::off,
+                          kNow - static_cast<std::uint32_t>(1500 * ring), 1000);
+        }
+      }
+  }
+
+  AlignmentProblem problem(const Pose& predicted, const Matrix6d& prior) const {
+    return {surface_, *camera_, T_body_cam_, points_, kNow, predicted, prior};
+  }
+
+  static Pose off(const Pose& pose) {
+    Vector6d d;
+    d << 0.008, -0.006, 0.01, 0.002, -0.003, 0.002;
+    return pose.plus(d);
+  }
+
+  std::shared_ptr<const Camera> camera_;
+  Pose T_body_cam_, truth_;
+  std::vector<AlignmentPoint> points_;
+  std::vector<Eigen::Vector3d> cam_;
+  TimeSurface surface_{320, 240};
+  Matrix6d loose_ = 1e-2 * Matrix6d::Identity();
+};
+
+TEST_F(AlignmentLaws, JacobianMatchesDifferences) {
+  const Pose at = off(truth_);
+  const AlignmentProblem p = problem(at, loose_);
+  int compared = 0;
+  for (const auto& point : points_) {
+    double r = 0;
+    Vector6d J;
+    if (!evaluate_point(p, FieldKernel::spline, at, point, &r, &J)) continue;
+    // The law is stated across the contour: move the point only there, by differencing the field along the normal.
+    for (int k = 0; k < 6; ++k) {
+      const double h = 1e-6;
+      const auto pixel = [&](double s) {
+        return *camera_->project((at.plus(s * Vector6d::Unit(k)) * T_body_cam_).inverse() * point.position_map);
+      };
+      const Eigen::Vector2d motion = (pixel(h) - pixel(-h)) / (2 * h);
+      const auto field = [&](double s) {
+        return sample_field(surface_, pixel(0) + s * point.normal_px, kNow, point.decay_us, FieldKernel::spline).value;
+      };
+      const double slope = (field(1e-5) - field(-1e-5)) / 2e-5;
+      EXPECT_NEAR(J(k), -slope * point.normal_px.dot(motion), 1e-5 * (1 + std::abs(J(k))));
+    }
+    ++compared;
+  }
+  EXPECT_GT(compared, 400);
+}
+
+TEST_F(AlignmentLaws, FindsThePoseTheEventsWereDrawnFrom) {
+  ThreadPool pool(1);
+  RegistrationConfig config;
+  config.max_iterations = 30;
+  const AlignmentResult r = align(problem(off(truth_), loose_), config, pool);
+  const Vector6d e = r.T_map_body.minus(truth_);
+  EXPECT_LT(e.head<3>().norm(), 2.5e-3);  // events are rounded to whole pixels: 3 m / 300 px
+  EXPECT_LT(e.tail<3>().norm(), 1e-3);
+  EXPECT_GT(r.matched, 0.9 * r.seen);
+}
+
+TEST_F(AlignmentLaws, BothSolversFindTheSameMinimum) {
+  ThreadPool pool(1);
+  RegistrationConfig config;
+  config.max_iterations = 60;
+  config.converged_px = 1e-5;
+  const AlignmentProblem p = problem(off(truth_), loose_);
+  const AlignmentResult ours = align(p, config, pool), reference = align_ceres(p, config);
+  const Vector6d d = ours.T_map_body.minus(reference.T_map_body);
+  EXPECT_LT(d.head<3>().norm(), 1e-4);
+  EXPECT_LT(d.tail<3>().norm(), 3e-5);
+  EXPECT_LE(ours.cost, reference.cost * 1.0005);
+}
+
+TEST_F(AlignmentLaws, AnyNumberOfThreadsGivesTheSameBits) {
+  ThreadPool one(1), three(3);
+  const AlignmentProblem p = problem(off(truth_), loose_);
+  const AlignmentResult a = align(p, {}, one), b = align(p, {}, three);
+  EXPECT_EQ(a.T_map_body.p, b.T_map_body.p);
+  EXPECT_EQ(a.T_map_body.q.coeffs(), b.T_map_body.q.coeffs());
+  EXPECT_EQ(a.information, b.information);
+}
+
+TEST_F(AlignmentLaws, AStrongPriorHoldsThePredictionAndNoEventsChangeNothing) {
+  ThreadPool pool(1);
+  const Pose predicted = off(truth_);
+  const AlignmentResult held = align(problem(predicted, 1e14 * Matrix6d::Identity()), {}, pool);
+  EXPECT_LT(held.T_map_body.minus(predicted).norm(), 1e-8);
+  const TimeSurface empty(320, 240);
+  const AlignmentProblem p{empty, *camera_, T_body_cam_, points_, kNow, predicted, loose_};
+  const AlignmentResult blind = align(p, {}, pool);
+  EXPECT_EQ(blind.matched, 0);
+  EXPECT_EQ(blind.information, Matrix6d::Zero());
+  EXPECT_LT(blind.T_map_body.minus(predicted).norm(), 1e-12);
+}
+
+TEST_F(AlignmentLaws, InformationAndVectorPointFromThePredictionToTheMinimum) {
+  ThreadPool pool(1);
+  RegistrationConfig config;
+  config.max_iterations = 50;
+  config.converged_px = 1e-6;
+  const Pose predicted = off(truth_);
+  const AlignmentResult r = align(problem(predicted, loose_), config, pool);
+  // At the joint minimum the gradient vanishes: information d - vector + prior d = 0.
+  const Vector6d d = r.T_map_body.minus(predicted);
+  const Vector6d gradient = r.information * d - r.vector + loose_ * d;
+  EXPECT_LT((Matrix6d(r.information + loose_).inverse() * gradient).norm(), 2e-4);
+}
+
+TEST(TemporalField, DecayAtOneTimeConstantIsOneOverE) {
+  TimeSurface surface(20, 20);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 20; ++x) surface.insert(x, y, Polarity::on, 4000, 1);
+  for (FieldKernel kernel : {FieldKernel::bilinear, FieldKernel::spline}) {
+    const FieldSample s = sample_field(surface, {8.3, 9.7}, 9000, 5000, kernel);
+    EXPECT_NEAR(s.value, std::exp(-1), 1e-6);
+    EXPECT_LT(s.gradient.norm(), 1e-6);
+  }
+}
+
+TEST(TemporalField, NewerPolarityWins) {
+  TimeSurface surface(20, 20);
+  surface.insert(5, 5, Polarity::on, 1000, 1);
+  surface.insert(5, 5, Polarity::off, 2000, 1);
+  EXPECT_NEAR(sample_field(surface, {5, 5}, 3000, 1000, FieldKernel::bilinear).value, std::exp(-1), 1e-6);
+}
+
+TEST(TemporalField, GradientMatchesDifferences) {
+  std::mt19937 random(2);
+  TimeSurface surface(30, 30);
+  for (int i = 0; i < 400; ++i)
+    surface.insert(static_cast<int>(random() % 30), static_cast<int>(random() % 30), Polarity::on,
+                   static_cast<std::uint32_t>(random() % 10000 + 1), 1);
+  for (FieldKernel kernel : {FieldKernel::bilinear, FieldKernel::spline})
+    for (const Eigen::Vector2d& u : {Eigen::Vector2d(10.3, 12.6), Eigen::Vector2d(3.5, 25.2), Eigen::Vector2d(0.4, 28.7)}) {
+      const auto value = [&](double dx, double dy) {
+        return sample_field(surface, u + Eigen::Vector2d(dx, dy), 10000, 4000, kernel).value;
+      };
+      const double h = 1e-4;
+      const FieldSample s = sample_field(surface, u, 10000, 4000, kernel);
+      EXPECT_NEAR(s.gradient.x(), (value(h, 0) - value(-h, 0)) / (2 * h), 1e-6);
+      EXPECT_NEAR(s.gradient.y(), (value(0, h) - value(0, -h)) / (2 * h), 1e-6);
+    }
+}
+
+TEST(TemporalField, SplineIsContinuousAcrossPixelCentres) {
+  TimeSurface surface(20, 20);
+  surface.insert(9, 9, Polarity::on, 5000, 1);
+  surface.insert(10, 9, Polarity::on, 3000, 1);
+  const FieldSample a = sample_field(surface, {9 - 1e-9, 9.2}, 6000, 2000, FieldKernel::spline);
+  const FieldSample b = sample_field(surface, {9 + 1e-9, 9.2}, 6000, 2000, FieldKernel::spline);
+  EXPECT_NEAR(a.value, b.value, 1e-7);
+  EXPECT_LT((a.gradient - b.gradient).norm(), 1e-7);
+}
+
+}  // namespace
+}  // namespace evpose

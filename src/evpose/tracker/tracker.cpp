@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/tracker/tracker.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+namespace {
+
+double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
+  Eigen::Vector3f low = map.points.front().position, high = low;
+  for (const auto& q : map.points) low = low.cwiseMin(q.position), high = high.cwiseMax(q.position);
+  const Eigen::Vector3d relative = p - map.anchor;
+  return (low.cast<double>() - relative).cwiseMax(relative - high.cast<double>()).cwiseMax(0).norm();
+}
+
+/// Each field has its own choice of points.
+VisibleSetConfig spread(const TrackerConfig& config) {
+  VisibleSetConfig out = config.visible;
+  if (config.field == FieldKind::exponential) {
+    out.cell_px = config.exponential.cell_px;
+    out.per_bin = config.exponential.per_bin;
+  }
+  return out;
+}
+
+double median(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, TrackerConfig& c) {
+  table.add("rate_hz", c.rate_hz, "Hz", "updates per second of data time", {1, 5000});
+  table.add("threads", c.threads, "", "threads of the alignment; the result is the same for any number", {1, 64});
+  table.group("events", c.events);
+  table.group("visible", c.visible);
+  table.add("field", c.field, {{"events", FieldKind::events}, {"exponential", FieldKind::exponential}},
+            "each event once against the moving contours, or the paper's temporal distance field");
+  table.group("alignment", c.alignment);
+  table.group("exponential", c.exponential);
+  table.group("ekf", c.ekf);
+  table.group("health", c.health);
+}
+
+Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, const TrackerConfig& config,
+                                                   const StartState& start, StageClock clock) {
+  EVPOSE_CHECK(setup.camera != nullptr && setup.map != nullptr);
+  const ContourMap& map = *setup.map;
+  if (map.points.empty()) return Error{map.source, "the map has no contour points", "give a map with contours"};
+  if (!start.T_map_body.p.allFinite() || !start.T_map_body.q.coeffs().allFinite() || !start.velocity.allFinite())
+    return Error{"start pose", "not finite", "check --init"};
+  const double outside = distance_outside(map, start.T_map_body.p);
+  if (outside > config.visible.far_m)
+    return Error{"start pose", text("(", start.T_map_body.p.x(), ", ", start.T_map_body.p.y(), ", ", start.T_map_body.p.z(),
+                                    ") m is ", outside, " m off the map, which is seen up to ", config.visible.far_m, " m"),
+                 "check that map and start pose share one frame (frames.T_map_world in recording.yaml)"};
+  return std::unique_ptr<Tracker>(new Tracker(setup, config, start, std::move(clock)));
+}
+
+Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock)
+    : setup_(setup),
+      config_(config),
+      clock_(std::move(clock)),
+      pool_(config.threads),
+      index_(*setup_.map),
+      visible_(index_, *setup_.camera, spread(config)),
+      front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
+      ekf_(setup.motion, config.ekf, setup.imu_noise),
+      health_(config.health),
+      start_t_(start.t),
+      alignment_(setup_.camera->size(), config.alignment) {
+  ekf_.start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
+  health_.start(start.t);
+  next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
+}
+
+void Tracker::add_imu(const ImuSample& sample) {
+  if (setup_.motion != MotionModel::imu) return;
+  imu_.push_back(sample);
+  // Before the start only the last sample matters.
+  while (imu_.size() >= 2 && imu_[1].t <= ekf_.state().t) imu_.pop_front();
+  pump();
+}
+
+void Tracker::add_events(const EventPacket& packet) {
+  std::size_t from = 0;
+  if (waiting_.empty()) consume(packet, &from);
+  if (from == packet.events.size()) return;
+  waiting_.push_back({packet.base, {packet.events.begin() + static_cast<std::ptrdiff_t>(from), packet.events.end()}});
+}
+
+void Tracker::pump() {
+  while (!waiting_.empty()) {
+    consume(waiting_.front(), &waiting_from_);
+    if (waiting_from_ < waiting_.front().events.size()) return;
+    waiting_.pop_front();
+    waiting_from_ = 0;
+  }
+}
+
+std::size_t Tracker::feed(const EventPacket& packet, std::size_t from, TimeNs until) {
+  const auto begin = packet.events.begin() + static_cast<std::ptrdiff_t>(from);
+  const auto end = std::upper_bound(begin, packet.events.end(), until,
+                                    [&](TimeNs t, const Event& e) { return t < packet.time(e); });
+  const double t0 = now();
+  front_.take(packet, {begin, end});
+  events_time_s_ += now() - t0;
+  return static_cast<std::size_t>(end - begin);
+}
+
+void Tracker::consume(const EventPacket& packet, std::size_t* from) {
+  while (*from < packet.events.size()) {
+    // An event after the update's time proves that all events up to it are here.
+    *from += feed(packet, *from, next_update_);
+    if (*from == packet.events.size()) return;
+    if (setup_.motion == MotionModel::imu && (imu_.empty() || imu_.back().t < next_update_)) return;
+    const Update result = update(next_update_);
+    ++update_number_;
+    next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
+    if (callback_) callback_(result);
+  }
+}
+
+void Tracker::predict(TimeNs t) {
+  if (setup_.motion == MotionModel::constant_velocity) return ekf_.predict(t);
+  // Make the first sample stand at the state's time, then step from sample to sample; the last step ends at t.
+  const TimeNs from = ekf_.state().t;
+  if (imu_.front().t > from) imu_.push_front({from, imu_.front().gyro, imu_.front().accel});
+  while (imu_.size() >= 2 && imu_[1].t <= from) imu_.pop_front();
+  if (imu_.front().t < from) imu_.front() = interpolate(imu_.front(), imu_[1], from);
+  while (imu_[1].t < t) {
+    ekf_.predict(imu_[0], imu_[1]);
+    imu_.pop_front();
+  }
+  const ImuSample last = interpolate(imu_[0], imu_[1], t);
+  ekf_.predict(imu_[0], last);
+  imu_.front() = last;
+}
+
+double Tracker::plan_points(const Pose& T_map_body, double span_s) {
+  const Pose T_body_cam = setup_.T_body_cam;
+  const Eigen::Matrix3d R_body_map = T_map_body.rotation().transpose();
+  const Eigen::Matrix3d R_cam_body = T_body_cam.rotation().transpose();
+  const Eigen::Vector3d rate_body = ekf_.angular_rate();
+  // The pose half the span and the whole span ago, by the predicted twist.
+  Pose T_cam_map[3];
+  for (int k = 0; k < 3; ++k) {
+    const double age = 0.5 * k * span_s;
+    const Pose past{T_map_body.q * so3::exp(-age * rate_body), T_map_body.p - age * ekf_.state().nav.velocity};
+    T_cam_map[k] = (past * T_body_cam).inverse();
+  }
+  const Eigen::Matrix3d R_cam_map = T_cam_map[0].rotation();
+  const Camera& camera = *setup_.camera;
+  const ContourMap& map = *setup_.map;
+  const double h = 0.5 * span_s;
+  points_.clear();
+  samples_.clear();
+  std::vector<double> flows, depths;
+  for (const std::uint32_t i : visible_.choose(T_map_body * T_body_cam)) {
+    const Eigen::Vector3d position = map.position(i);
+    const Eigen::Vector3d x_cam = T_cam_map[0] * position;
+    Matrix23d J;
+    const auto pixel = camera.project(x_cam, &J);
+    const auto half_ago = camera.project(T_cam_map[1] * position), ago = camera.project(T_cam_map[2] * position);
+    if (!pixel || !half_ago || !ago) continue;
+    const Eigen::Vector2d along = J * (R_cam_map * map.points[i].tangent.cast<double>());
+    if (!(along.norm() > 0)) continue;
+    const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
+    // n.(u(t - a) - u(t)) = -s1 a + s2 a^2 through the two past projections.
+    const double d1 = normal.dot(*half_ago - *pixel), d2 = normal.dot(*ago - *pixel);
+    const double speed = (d2 - 4 * d1) / (2 * h);
+    if (config_.field == FieldKind::events) {
+      ContourSample s{*pixel, normal, speed, (d2 - 2 * d1) / (2 * h * h), {}, 0};
+      const Eigen::RowVector3d across = normal.transpose() * J;
+      const Eigen::RowVector3d A = across * R_cam_body;
+      const Eigen::Vector3d x_body = T_body_cam * x_cam;
+      s.jacobian.head<3>() = (A * R_body_map).transpose();
+      s.jacobian.tail<3>() = -(A * so3::hat(x_body)).transpose();
+      const double sigma_m = map.points[i].sigma > 0 ? map.points[i].sigma : config_.alignment.map_sigma_m;
+      s.map_sigma_px = sigma_m * across.norm();
+      samples_.push_back(s);
+    } else {
+      const RegistrationConfig& c = config_.exponential;
+      const double decay_s = std::clamp(c.decay_px / std::max(std::abs(speed), 1e-9), c.decay_min_s,
+                                        std::max(c.decay_min_s, c.decay_max_s));
+      points_.push_back({position, normal, 1e6 * decay_s});
+    }
+    flows.push_back((*half_ago - *pixel).norm() / h);
+    depths.push_back(x_cam.norm());
+  }
+  if (!depths.empty()) typical_depth_m_ = median(depths);
+  return median(flows);
+}
+
+Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
+  const Matrix6d covariance = ekf_.state().pose_covariance();
+  if (config_.field == FieldKind::events) {
+    const EventAlignmentResult r = alignment_.align({front_.kept(), front_.stamp(t), span_s,
+                                                     to_seconds(t - start_t_), samples_, covariance});
+    return {{r.information, r.vector}, static_cast<int>(samples_.size()), r.matched_samples, std::sqrt(r.mean_square_px2)};
+  }
+  const Matrix6d prior = covariance.ldlt().solve(Matrix6d::Identity());
+  const AlignmentProblem problem{front_.surface(), *setup_.camera, setup_.T_body_cam, points_,
+                                 front_.stamp(t), predicted,       prior};
+  const AlignmentResult r = align(problem, config_.exponential, pool_);
+  return {{r.information, r.vector}, r.seen, r.matched, std::sqrt(r.cost)};
+}
+
+std::string Tracker::refusal(const Registration& r, double innovation) const {
+  const HealthConfig& h = config_.health;
+  if (r.points == 0) return "no map point in view";
+  if (r.matched < h.least_points)
+    return text("only ", r.matched, " of ", r.points, " map points have events near by");
+  if (!(innovation <= h.gate)) return "registration contradicts the prediction";
+  return "";
+}
+
+Update Tracker::update(TimeNs t) {
+  Update out;
+  out.t = t;
+  const double span_s = to_seconds(t - ekf_.state().t);
+  const double t0 = now();
+  predict(t);
+  const Pose predicted = ekf_.state().nav.T_map_body;
+  const double t1 = now();
+
+  const double flow_px_s = plan_points(predicted, span_s);
+  const double t2 = now();
+
+  const Registration stpe = register_events(t, predicted, span_s);
+  const double t3 = now();
+
+  Evidence evidence;
+  evidence.t = t;
+  out.innovation = ekf_.innovation(stpe.measurement);
+  evidence.refused = refusal(stpe, out.innovation);
+  evidence.accepted = evidence.refused.empty();
+  if (evidence.accepted) ekf_.update(stpe.measurement);  // eq. (5) for the newest state
+
+  const Matrix6d covariance = ekf_.state().pose_covariance();
+  const auto largest = [](const Eigen::Matrix3d& m) {
+    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
+  };
+  evidence.sigma_px = setup_.camera->focal_px() * std::max(largest(covariance.topLeftCorner<3, 3>()) / typical_depth_m_,
+                                                           largest(covariance.bottomRightCorner<3, 3>()));
+  out.health = health_.judge(evidence, &out.reason);
+
+  const FusionState& state = ekf_.state();
+  out.T_map_body = state.nav.T_map_body;
+  out.velocity = state.nav.velocity;
+  out.gyro_bias = state.gyro_bias;
+  out.accel_bias = state.accel_bias;
+  out.covariance = covariance;
+  out.accepted = evidence.accepted;
+  out.events_read = static_cast<std::int32_t>(front_.counts().read - counted_.read);
+  out.events_kept = static_cast<std::int32_t>(front_.counts().kept - counted_.kept);
+  out.points = stpe.points;
+  out.points_matched = stpe.matched;
+  out.residual = stpe.residual;
+  out.times = {events_time_s_, t1 - t0, t2 - t1, t3 - t2, now() - t3};
+  counted_ = front_.counts();
+  events_time_s_ = 0;
+  front_.set_motion(flow_px_s);
+  front_.forget();
+  return out;
+}
+
+Tracker::Snapshot Tracker::snapshot(double decay_s) const {
+  Snapshot out;
+  const TimeSurface& surface = front_.surface();
+  const Pose T_map_body = ekf_.state().nav.T_map_body;
+  const std::uint32_t now_us = front_.stamp(ekf_.state().t);
+  out.size = setup_.camera->size();
+  out.decay.reserve(static_cast<std::size_t>(surface.width()) * static_cast<std::size_t>(surface.height()));
+  for (int y = 0; y < surface.height(); ++y)
+    for (int x = 0; x < surface.width(); ++x) {
+      const std::uint32_t on = surface.last(x, y, Polarity::on), off = surface.last(x, y, Polarity::off);
+      const std::uint32_t last = std::max(on, off);
+      const double age_s = 1e-6 * (now_us > last ? now_us - last : 0);
+      const auto value = static_cast<float>(last == 0 ? 0 : std::exp(-age_s / decay_s));
+      out.decay.push_back(on >= off ? value : -value);
+    }
+  const Pose T_cam_map = (T_map_body * setup_.T_body_cam).inverse();
+  const double decay_us = 1e6 * decay_s;
+  for (const std::uint32_t i : visible_.chosen()) {
+    const auto pixel = setup_.camera->project(T_cam_map * setup_.map->position(i));
+    if (!pixel || !out.size.contains(*pixel)) continue;
+    const double field = sample_field(surface, *pixel, now_us, decay_us, FieldKernel::bilinear).value;
+    out.points.push_back({static_cast<float>(pixel->x()), static_cast<float>(pixel->y()), field >= 0.3679});
+  }
+  return out;
+}
+
+}  // namespace evpose

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "evpose/camera/camera.h"
+#include "evpose/core/error.h"
+#include "evpose/core/parallel.h"
+#include "evpose/event/event_front.h"
+#include "evpose/fusion/ekf.h"
+#include "evpose/map/visible_set.h"
+#include "evpose/registration/event_alignment.h"
+#include "evpose/registration/registration.h"
+#include "evpose/tracker/health.h"
+#include "evpose/tracker/update.h"
+
+namespace evpose {
+
+struct TrackerConfig {
+  double rate_hz = 300;   ///< updates per second of data time
+  int threads = 1;        ///< for the alignment; the estimate is the same for any number
+  EventFrontConfig events;
+  VisibleSetConfig visible;
+  FieldKind field = FieldKind::events;
+  EventAlignmentConfig alignment;      ///< of field == events
+  RegistrationConfig exponential;      ///< of field == exponential
+  EkfConfig ekf;
+  HealthConfig health;
+};
+void describe(ConfigTable& table, TrackerConfig& config);
+
+/// What the tracker is told once.
+struct TrackerSetup {
+  std::shared_ptr<const Camera> camera;
+  Pose T_body_cam;                       ///< body = IMU; identity without an IMU
+  MotionModel motion = MotionModel::imu;
+  ImuNoise imu_noise;
+  std::shared_ptr<const ContourMap> map;
+};
+
+/// Where it starts.
+struct StartState {
+  TimeNs t = 0;
+  Pose T_map_body;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();           ///< map frame, m/s
+  Eigen::Vector3d angular_rate_body = Eigen::Vector3d::Zero();  ///< rad/s; used without an IMU
+};
+
+/// Events and IMU samples in, poses out. Knows neither files nor wall time; the same data give the same bytes,
+/// however they are cut into packets and for any number of threads.
+class Tracker {
+ public:
+  /// Seconds on any monotone clock; used for Update::times alone.
+  using StageClock = std::function<double()>;
+
+  /// Error: a start that is not finite, or further from the map than the map can be seen.
+  static Expected<std::unique_ptr<Tracker>> create(const TrackerSetup& setup, const TrackerConfig& config,
+                                                   const StartState& start, StageClock clock = {});
+
+  /// Called at each update, in order of time.
+  void on_update(std::function<void(const Update&)> callback) { callback_ = std::move(callback); }
+
+  /// In order of time. An update is made as soon as both streams have passed its time.
+  void add_imu(const ImuSample& sample);
+  void add_events(const EventPacket& packet);
+
+  const EventFront& events() const { return front_; }
+
+  /// What the alignment saw at the last update, for pictures.
+  struct Snapshot {
+    ImageSize size;
+    std::vector<float> decay;   ///< row-major; > 0 on, < 0 off, exp(-age / decay_s)
+    struct Point {
+      float x, y;               ///< px, at the updated pose
+      bool matched;
+    };
+    std::vector<Point> points;
+  };
+  Snapshot snapshot(double decay_s) const;
+
+ private:
+  Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock);
+
+  void pump();
+  /// Feeds the front with events of `packet` from `from` on that are not after `until`; the number fed.
+  std::size_t feed(const EventPacket& packet, std::size_t from, TimeNs until);
+  void consume(const EventPacket& packet, std::size_t* from);
+  void predict(TimeNs t);
+  struct Registration {
+    PoseInformation measurement;
+    int points = 0, matched = 0;
+    double residual = 0;
+  };
+  /// Fills points_ or samples_ from the visible set; the median image motion, px/s.
+  double plan_points(const Pose& T_map_body, double span_s);
+  Registration register_events(TimeNs t, const Pose& predicted, double span_s);
+  /// Why a registration is not used; empty if it is.
+  std::string refusal(const Registration& registration, double innovation) const;
+  Update update(TimeNs t);
+  double now() const { return clock_ ? clock_() : 0; }
+
+  TrackerSetup setup_;
+  TrackerConfig config_;
+  StageClock clock_;
+  ThreadPool pool_;
+  ContourIndex index_;
+  VisibleSet visible_;
+  EventFront front_;
+  Ekf ekf_;
+  HealthMonitor health_;
+  std::function<void(const Update&)> callback_;
+
+  TimeNs start_t_;
+  std::int64_t update_number_ = 0;
+  TimeNs next_update_ = 0;
+  std::deque<ImuSample> imu_;              ///< from the state's time on; the first is at it once started
+  std::deque<EventPacket> waiting_;        ///< events that arrived before their IMU samples
+  std::size_t waiting_from_ = 0;           ///< consumed part of the first
+  EventAlignment alignment_;
+  std::vector<AlignmentPoint> points_;   ///< of the exponential field
+  std::vector<ContourSample> samples_;   ///< of the events' alignment
+  double typical_depth_m_ = 3;
+  EventFront::Counts counted_;
+  double events_time_s_ = 0;
+};
+
+}  // namespace evpose

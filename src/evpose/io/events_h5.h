@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "evpose/io/event_reader.h"
+
+namespace evpose {
+
+/// HDF5 with 1-D x, y, t, p of equal length in /events (DSEC, TUM-VIE, VECtor, ours), or in the first group
+/// of the root that has all four. t: any number type, microseconds unless the options say otherwise
+/// (floating-point stamps need a stated unit); /t_offset is added. p: 0/1 or -1/+1.
+Expected<std::unique_ptr<EventReader>> open_events_h5(const std::string& path,
+                                                      const EventReadOptions& options);
+
+/// Writes events.h5: i64 us, u16, u16, u8, chunks of 65,536, shuffle + deflate.
+class EventWriterH5 {
+ public:
+  /// `sensor` is free text. Nothing stands at `path` before finish().
+  static Expected<EventWriterH5> create(const std::string& path, ImageSize size, const std::string& sensor);
+  EventWriterH5(EventWriterH5&& other) noexcept;
+  EventWriterH5& operator=(EventWriterH5&& other) noexcept;
+  ~EventWriterH5();
+
+  /// Stamps are rounded down to microseconds. Events must be in order, within and between packets, and inside
+  /// the size: faults of ours.
+  Status append(const EventPacket& packet);
+  Status finish();
+
+ private:
+  struct Impl;
+  explicit EventWriterH5(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace evpose

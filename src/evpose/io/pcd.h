@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "evpose/core/error.h"
+#include "evpose/io/point_table.h"
+
+namespace evpose {
+
+/// PCD 0.7: ascii, binary, binary_compressed. A field with COUNT n > 1 becomes columns name_0 .. name_n-1.
+/// Rows whose x, y or z is not finite mark absent points: they are dropped, with one warning that counts
+/// them.
+Expected<PointTable> read_pcd(const std::string& path);
+
+}  // namespace evpose

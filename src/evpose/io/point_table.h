@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace evpose {
+
+/// Columns of numbers by name, as point files hold them.
+struct PointTable {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> columns;  ///< one for each name, all of equal length
+
+  std::size_t rows() const { return columns.empty() ? 0 : columns.front().size(); }
+  /// The column, or nullptr.
+  const std::vector<double>* find(const std::string& name) const {
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (names[i] == name) return &columns[i];
+    return nullptr;
+  }
+};
+
+}  // namespace evpose

@@ -7,8 +7,8 @@
 namespace evpose {
 namespace {
 // A surface hides a point if it is nearer by this length plus this share of the depth.
-constexpr float kSlack_m = 0.03F;
-constexpr float kSlackShare = 0.015F;
+constexpr float kSlack_m = 0.01F;
+constexpr float kSlackShare = 0.002F;
 // ... and, in the cells around, by this share: a silhouette close by.
 constexpr float kSilhouetteShare = 0.10F;
 }  // namespace
@@ -18,11 +18,11 @@ DepthBuffer::DepthBuffer(const Eigen::Vector2d& tangents, double cell)
       cell_(static_cast<float>(cell)),
       columns_(static_cast<int>(2 * tangents.x() / cell) + 1),
       rows_(static_cast<int>(2 * tangents.y() / cell) + 1) {
-  inverse_depth_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
 }
 
 void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double near_m) {
-  std::fill(inverse_depth_.begin(), inverse_depth_.end(), 0.0F);
+  std::fill(cells_.begin(), cells_.end(), Cell{0, Eigen::Vector3f::Zero()});
   const Pose T_cam_map = T_map_cam.inverse();
   const Eigen::Matrix3f R = T_cam_map.rotation().cast<float>();
   const Eigen::Vector3f offset = (T_cam_map * map.anchor).cast<float>();
@@ -43,19 +43,20 @@ void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners, float near_m) {
     if (a.z() >= near_m) kept[n++] = a;
     if ((a.z() >= near_m) != (b.z() >= near_m)) kept[n++] = a + (near_m - a.z()) / (b.z() - a.z()) * (b - a);
   }
-  for (int i = 2; i < n; ++i) draw(kept[0], kept[i - 1], kept[i]);
+  if (n < 3) return;
+  // The plane n.x = d gives 1 / z = n.(x / z, y / z, 1) / d; planes through the eye are seen edge-on.
+  const Eigen::Vector3f normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+  const float distance = normal.dot(corners[0]);
+  if (!(std::abs(distance) > 1e-4F)) return;
+  for (int i = 2; i < n; ++i) draw(kept[0], kept[i - 1], kept[i], normal / distance);
 }
 
-void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c) {
+void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope) {
   // To grid coordinates (cell centres at whole numbers); 1 / z is linear over the grid.
   for (Eigen::Vector3f* v : {&a, &b, &c}) {
     const float w = 1 / v->z();
     *v = {(v->x() * w + tangents_.x()) / cell_ - 0.5F, (v->y() * w + tangents_.y()) / cell_ - 0.5F, w};
   }
-  const float area = (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
-  if (!(std::abs(area) > 1e-9F)) return;
-  const float dwdx = ((b.z() - a.z()) * (c.y() - a.y()) - (c.z() - a.z()) * (b.y() - a.y())) / area;
-  const float dwdy = ((c.z() - a.z()) * (b.x() - a.x()) - (b.z() - a.z()) * (c.x() - a.x())) / area;
   if (a.y() > b.y()) std::swap(a, b);
   if (b.y() > c.y()) std::swap(b, c);
   if (a.y() > b.y()) std::swap(a, b);
@@ -70,24 +71,30 @@ void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c) 
     if (left > right) std::swap(left, right);
     const float x0 = std::max(std::ceil(left), 0.0F), x1 = std::min(std::floor(right), static_cast<float>(columns_ - 1));
     if (!(x0 <= x1)) continue;
-    float w = a.z() + dwdx * (x0 - a.x()) + dwdy * (y - a.y());
-    float* cell = &inverse_depth_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(x0)];
-    for (float x = x0; x <= x1; ++x, ++cell, w += dwdx) *cell = std::max(*cell, w);
+    const float v = (y + 0.5F) * cell_ - tangents_.y(), row_part = slope.y() * v + slope.z();
+    Cell* cell = &cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(x0)];
+    for (float x = x0; x <= x1; ++x, ++cell) {
+      const float w = slope.x() * ((x + 0.5F) * cell_ - tangents_.x()) + row_part;
+      if (w > cell->inverse_depth) *cell = {w, slope};
+    }
   }
 }
 
 bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
   const auto z = static_cast<float>(point_cam.z());
-  const int column = static_cast<int>(std::lround((point_cam.x() / point_cam.z() + tangents_.x()) / cell_ - 0.5));
-  const int row = static_cast<int>(std::lround((point_cam.y() / point_cam.z() + tangents_.y()) / cell_ - 0.5));
-  const auto nearest = [&](int c, int r) {
-    if (c < 0 || r < 0 || c >= columns_ || r >= rows_) return 0.0F;
-    return inverse_depth_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
+  const Eigen::Vector3f ray = (point_cam / point_cam.z()).cast<float>();
+  const int column = static_cast<int>(std::lround((ray.x() + tangents_.x()) / cell_ - 0.5F));
+  const int row = static_cast<int>(std::lround((ray.y() + tangents_.y()) / cell_ - 0.5F));
+  const auto cell = [&](int c, int r) -> const Cell* {
+    if (c < 0 || r < 0 || c >= columns_ || r >= rows_) return nullptr;
+    return &cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
   };
-  if (nearest(column, row) * (z - kSlack_m - kSlackShare * z) > 1) return true;
+  if (const Cell* own = cell(column, row); own != nullptr && own->inverse_depth > 0) {
+    if (own->slope.dot(ray) * (z - kSlack_m - kSlackShare * z) > 1) return true;
+  }
   for (int r = row - 1; r <= row + 1; ++r)
     for (int c = column - 1; c <= column + 1; ++c)
-      if (nearest(c, r) * (z - kSlack_m - kSilhouetteShare * z) > 1) return true;
+      if (const Cell* near = cell(c, r); near != nullptr && near->inverse_depth * (z - kSilhouetteShare * z) > 1) return true;
   return false;
 }
 

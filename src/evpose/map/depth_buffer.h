@@ -19,18 +19,23 @@ class DepthBuffer {
   /// Draws the triangles as seen from the camera; those nearer than `near_m` are cut there.
   void render(const ContourMap& map, const Pose& T_map_cam, double near_m);
 
-  /// True if a surface stands before the point by more than the slack that the grid and the surfaces' slope
-  /// need. Points beside a much nearer silhouette count as hidden: which of the two an event belongs to is open.
+  /// True if a surface stands before the point. The surface that holds the cell is asked at the point itself, so
+  /// that the edge of a thin board is not hidden by its own faces, and its far edge is. Points beside a much nearer silhouette count as hidden: which of the two an event belongs to is open.
   bool hides(const Eigen::Vector3d& point_cam) const;
 
  private:
-  void draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c);
+  /// A surface seen in the grid: at (x / z, y / z) its 1 / z is slope . (x / z, y / z, 1).
+  struct Cell {
+    float inverse_depth;      ///< of the nearest surface at the cell's centre, 0: none
+    Eigen::Vector3f slope;
+  };
+  void draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);
   void clip_and_draw(const Eigen::Vector3f* corners, float near_m);
 
   Eigen::Vector2f tangents_;
   float cell_;
   int columns_, rows_;
-  std::vector<float> inverse_depth_;   ///< 1 / z of the nearest surface at each cell's centre, 0: none
+  std::vector<Cell> cells_;
   std::vector<Eigen::Vector3f> vertices_cam_;
 };
 

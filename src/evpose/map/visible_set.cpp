@@ -11,9 +11,10 @@ namespace evpose {
 namespace {
 
 constexpr int kBlockCubes = 8;  // a block is 8 x 8 x 8 cubes
-constexpr int kDirectionBins = 4;
 constexpr double kDepthCell_px = 2;  // of the occluders' depth buffer
-constexpr std::uint32_t kNoPoint = 0xFFFFFFFF;
+// Two points are on one contour of the image if their directions and offsets agree this well.
+constexpr float kSameDirectionSin = 0.2F;
+constexpr float kSameLine_px = 0.75F;
 
 /// A fixed random order of the points: choosing by it spreads points without regard to their order in the file.
 std::uint32_t priority_of(std::uint32_t point) {
@@ -64,8 +65,7 @@ Eigen::Vector2d half_view(const Camera& camera) {
 void describe(ConfigTable& table, VisibleSetConfig& c) {
   table.add("far_m", c.far_m, "m", "points further away are left out", {0.1, 1e5});
   table.add("near_m", c.near_m, "m", "points nearer than this are left out", {1e-3, 100});
-  table.add("cell_px", c.cell_px, "px", "edge of the image cells over which points are spread", {4, 4096});
-  table.add("per_bin", c.per_bin, "", "points per cell and 45 deg of direction", {1, 64});
+  table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
   table.add("budget", c.budget, "", "most points in all", {6, 100000});
   table.add("margin_px", c.margin_px, "px", "points may lie this far outside of the image when chosen", {0, 1000});
   table.add("refresh_px", c.refresh_px, "px", "points are chosen again when the view has moved by this much", {0, 1000});
@@ -153,6 +153,9 @@ VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const Vi
   widest = std::min(widest + config.margin_px / camera.focal_px(), camera.valid_angle());
   cone_cos_ = std::cos(widest);
   cone_sin_ = std::sin(widest);
+  columns_ = static_cast<int>((size.width + 2 * config.margin_px) / config.stride_px) + 4;
+  rows_ = static_cast<int>((size.height + 2 * config.margin_px) / config.stride_px) + 4;
+  cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
 }
 
 bool VisibleSet::moved(const Pose& T_map_cam) const {
@@ -167,16 +170,35 @@ const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
   return points_;
 }
 
+bool VisibleSet::add(std::uint32_t point, const Eigen::Vector2d& pixel, const Eigen::Vector2d& direction) {
+  const auto stride = static_cast<float>(config_.stride_px);
+  const Eigen::Vector2f u = pixel.cast<float>(), t = direction.cast<float>();
+  const int column = static_cast<int>((pixel.x() + config_.margin_px) / config_.stride_px) + 1;
+  const int row = static_cast<int>((pixel.y() + config_.margin_px) / config_.stride_px) + 1;
+  for (int r = row - 1; r <= row + 1; ++r)
+    for (int c = column - 1; c <= column + 1; ++c)
+      for (std::int32_t k = cells_[static_cast<std::size_t>(r * columns_ + c)]; k >= 0; k = chosen_[static_cast<std::size_t>(k)].next) {
+        const Chosen& other = chosen_[static_cast<std::size_t>(k)];
+        const Eigen::Vector2f d = u - other.pixel;
+        if (d.squaredNorm() < stride * stride && std::abs(t.x() * d.y() - t.y() * d.x()) < kSameLine_px &&
+            std::abs(t.x() * other.direction.y() - t.y() * other.direction.x()) < kSameDirectionSin)
+          return false;
+      }
+  std::int32_t& head = cells_[static_cast<std::size_t>(row * columns_ + column)];
+  chosen_.push_back({u, t, head});
+  head = static_cast<std::int32_t>(chosen_.size() - 1);
+  points_.push_back(point);
+  return true;
+}
+
 void VisibleSet::refresh(const Pose& T_map_cam) {
   T_map_cam_ = T_map_cam;
   chosen_once_ = true;
   candidates_ = 0;
+  points_.clear();
+  chosen_.clear();
+  std::fill(cells_.begin(), cells_.end(), -1);
   const ImageSize size = camera_.size();
-  const int columns = static_cast<int>(size.width + 2 * config_.margin_px) / config_.cell_px + 1;
-  const int rows = static_cast<int>(size.height + 2 * config_.margin_px) / config_.cell_px + 1;
-  const auto per_bin = static_cast<std::size_t>(config_.per_bin);
-  slots_.assign(static_cast<std::size_t>(columns * rows * kDirectionBins) * per_bin, {0xFFFFFFFF, kNoPoint});
-
   const bool occlusion = config_.occlusion && !index_.map().occluders.triangles.empty();
   if (occlusion) depth_.render(index_.map(), T_map_cam, config_.near_m);
   near_cubes_.clear();
@@ -204,20 +226,9 @@ void VisibleSet::refresh(const Pose& T_map_cam) {
       if (occlusion && depth_.hides(x)) continue;
       ++candidates_;
       const Eigen::Vector2d direction = jacobian * tangent;
-      double angle = std::atan2(direction.y(), direction.x());
-      if (angle < 0) angle += M_PI;
-      const int bin = std::min(static_cast<int>(angle * (kDirectionBins / M_PI)), kDirectionBins - 1);
-      const int column = static_cast<int>((pixel->x() + config_.margin_px) / config_.cell_px);
-      const int row = static_cast<int>((pixel->y() + config_.margin_px) / config_.cell_px);
-      Slot* const first = &slots_[static_cast<std::size_t>((row * columns + column) * kDirectionBins + bin) * per_bin];
-      Slot candidate{priority_of(i), i};
-      for (Slot* s = first; s != first + per_bin; ++s)  // insertion into a short sorted list
-        if (candidate.priority < s->priority) std::swap(candidate, *s);
+      if (direction.squaredNorm() > 0) add(i, *pixel, direction.normalized());
     }
   }
-  points_.clear();
-  for (const Slot& s : slots_)
-    if (s.point != kNoPoint) points_.push_back(s.point);
   if (points_.size() > static_cast<std::size_t>(config_.budget)) {
     const auto middle = points_.begin() + config_.budget;
     std::nth_element(points_.begin(), middle, points_.end(),

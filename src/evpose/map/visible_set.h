@@ -53,9 +53,8 @@ class ContourIndex {
 struct VisibleSetConfig {
   double far_m = 40;          ///< points further away are left out
   double near_m = 0.1;        ///< points nearer are left out
-  int cell_px = 5;            ///< the image is divided into square cells,
-  int per_bin = 1;            ///< ... each gives at most so many points per 45 deg of direction
-  int budget = 3000;          ///< most points in all
+  double stride_px = 4;       ///< least distance of two points along one contour, in the image
+  int budget = 6000;          ///< most points in all
   double margin_px = 12;      ///< points may lie this far outside of the image when chosen
   double refresh_px = 8;      ///< chosen again when the view has moved by this much
   bool occlusion = true;      ///< leave out points behind the map's occluders, if it has any
@@ -63,8 +62,7 @@ struct VisibleSetConfig {
 };
 void describe(ConfigTable& table, VisibleSetConfig& config);
 
-/// The points to align: inside the frustum, not hidden, spread evenly over image and direction, the same from update to
-/// update until the view has moved (EV-Pose 5.3, "view-limited, occlusion-aware").
+/// The points to align: inside the frustum, not hidden, evenly along every contour, the same from update to update until the view has moved (EV-Pose 5.3, "view-limited, occlusion-aware").
 class VisibleSet {
  public:
   VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config);
@@ -93,10 +91,15 @@ class VisibleSet {
   double nearest_m_ = 0;  ///< depth of the nearest chosen point
   std::size_t candidates_ = 0;
   std::vector<std::uint32_t> points_, near_cubes_;
-  struct Slot {
-    std::uint32_t priority, point;
+  /// A chosen point in the grid of `stride_px` cells that finds its neighbours along the contour.
+  struct Chosen {
+    Eigen::Vector2f pixel, direction;
+    std::int32_t next;  ///< of the same cell, -1: none
   };
-  std::vector<Slot> slots_;
+  bool add(std::uint32_t point, const Eigen::Vector2d& pixel, const Eigen::Vector2d& direction);
+  int columns_, rows_;
+  std::vector<std::int32_t> cells_;
+  std::vector<Chosen> chosen_;
 };
 
 }  // namespace evpose

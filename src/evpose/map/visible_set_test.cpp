@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <map>
 #include <random>
 #include <set>
 
@@ -71,17 +70,34 @@ TEST_F(VisibleLaws, CandidatesAreExactlyTheFrustum) {
   for (const std::uint32_t i : chosen) EXPECT_TRUE(in_frustum(i, config));
 }
 
-TEST_F(VisibleLaws, NoCellGivesMoreThanItsShareAndTheBudgetHolds) {
-  VisibleSetConfig config;
-  config.per_bin = 1;
-  VisibleSet visible(index_, *camera_, config);
-  std::map<std::pair<int, int>, int> cells;
-  for (const std::uint32_t i : visible.choose(pose_)) {
-    const auto pixel = camera_->project(pose_.inverse() * map_.position(i));
-    ++cells[{static_cast<int>((pixel->x() + config.margin_px) / config.cell_px),
-             static_cast<int>((pixel->y() + config.margin_px) / config.cell_px)}];
+TEST_F(VisibleLaws, PointsOfALineKeepTheirDistanceAndCoverIt) {
+  ContourMap line;
+  for (int i = 0; i < 2000; ++i) {
+    ContourPoint p;
+    p.position = {-1 + 0.001F * static_cast<float>(i), 0.2F, 3};
+    p.tangent = {1, 0, 0};
+    line.points.push_back(p);
+    p.position.y() = 0.23F;  // a second line, 3 px from the first
+    line.points.push_back(p);
   }
-  for (const auto& [cell, n] : cells) EXPECT_LE(n, 4) << "one for each of four directions";
+  const ContourIndex index(line);
+  VisibleSetConfig config;
+  config.stride_px = 6;
+  VisibleSet visible(index, *camera_, config);
+  std::vector<double> along;
+  for (const std::uint32_t i : visible.choose(Pose{}))
+    if (i % 2 == 0) along.push_back(camera_->project(line.position(i))->x());
+  std::sort(along.begin(), along.end());
+  ASSERT_GT(along.size(), 20u);
+  for (std::size_t k = 1; k < along.size(); ++k) {
+    EXPECT_GE(along[k] - along[k - 1], 5.99);
+    EXPECT_LE(along[k] - along[k - 1], 12.0);
+  }
+  EXPECT_NEAR(static_cast<double>(visible.chosen().size()), 2.0 * static_cast<double>(along.size()), 6);
+}
+
+TEST_F(VisibleLaws, BudgetHolds) {
+  VisibleSetConfig config;
   config.budget = 50;
   VisibleSet small(index_, *camera_, config);
   EXPECT_EQ(small.choose(pose_).size(), 50u);

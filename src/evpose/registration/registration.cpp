@@ -77,8 +77,7 @@ void describe(ConfigTable& table, RegistrationConfig& c) {
   table.add("decay_min_s", c.decay_min_s, "s", "shortest time constant", {1e-4, 10});
   table.add("decay_max_s", c.decay_max_s, "s", "longest time constant", {1e-4, 10});
   table.add("robust_scale", c.robust_scale, "", "residual (0..1) beyond which Tukey's loss is flat", {0.01, 100});
-  table.add("cell_px", c.cell_px, "px", "points are spread over cells of this size", {4, 4096});
-  table.add("per_bin", c.per_bin, "", "points per cell and 45 deg of direction", {1, 64});
+  table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
   table.add("max_iterations", c.max_iterations, "", "most iterations of the minimiser", {1, 100});
   table.add("converged_px", c.converged_px, "px", "a smaller step ends the iteration", {1e-6, 10});
   table.add("noise", c.noise, "", "1 sigma of a residual at the optimum", {0.01, 100});

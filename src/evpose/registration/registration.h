@@ -30,7 +30,7 @@ struct RegistrationConfig {
   double decay_min_s = 3e-3;    ///< ... but at least
   double decay_max_s = 30e-3;   ///< ... and at most; min = max gives the paper's constant
   double robust_scale = 1.1;    ///< residual (0..1) beyond which Tukey's loss is flat
-  int cell_px = 32, per_bin = 2;  ///< choice of points, see VisibleSetConfig
+  double stride_px = 12;          ///< least distance of two points along one contour
   int max_iterations = 6;
   double converged_px = 0.01;   ///< a step that moves the points by less ends the iteration
   double noise = 0.5;           ///< 1 sigma of a residual at the optimum

@@ -21,10 +21,7 @@ double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
 /// Each field has its own choice of points.
 VisibleSetConfig spread(const TrackerConfig& config) {
   VisibleSetConfig out = config.visible;
-  if (config.field == FieldKind::exponential) {
-    out.cell_px = config.exponential.cell_px;
-    out.per_bin = config.exponential.per_bin;
-  }
+  if (config.field == FieldKind::exponential) out.stride_px = config.exponential.stride_px;
   return out;
 }
 

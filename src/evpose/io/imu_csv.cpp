@@ -46,6 +46,8 @@ std::string format_number(double value) {
 }  // namespace
 
 struct ImuReader::Impl {
+  Impl(LineReader reader, ImuReadOptions how) : lines(std::move(reader)), options(std::move(how)) {}
+
   LineReader lines;
   ImuReadOptions options;
   std::array<std::size_t, 7> places{};
@@ -98,8 +100,7 @@ Status ImuReader::Impl::parse(std::string_view line, ImuSample& sample) {
 }
 
 Status ImuReader::Impl::check_time(TimeNs t) {
-  // Differences stay far from overflow: 292 years fit.
-  if (std::abs(static_cast<double>(t)) > 9e18)
+  if (t > kLargestTimeNs || t < -kLargestTimeNs)
     return Error{lines.where(), text("the stamp ", t, " ns is out of range"), "set imu.time_unit"};
   if (first) return {};
   if (t <= last)
@@ -107,7 +108,7 @@ Status ImuReader::Impl::check_time(TimeNs t) {
                  t == last ? text("the stamp ", t, " ns stands twice")
                            : text("the stamp ", t, " ns goes back behind ", last, " ns"),
                  "sort the file and remove repeated samples"};
-  const double gap_s = (static_cast<double>(t) - static_cast<double>(last)) * 1e-9;
+  const double gap_s = to_seconds(t - last);
   if (gap_s > options.max_gap_s)
     return Error{lines.where(),
                  text("a gap of ", gap_s, " s before this sample, more than ", options.max_gap_s, " s"),
@@ -149,7 +150,7 @@ Expected<ImuReader> ImuReader::open(const std::string& path, const ImuReadOption
   const auto& columns = options.columns.empty() ? kColumns : options.columns;
   const auto places = places_of(columns, path);
   if (!places) return places.error();
-  auto impl = std::make_unique<Impl>(Impl{.lines = *std::move(lines), .options = options});
+  auto impl = std::make_unique<Impl>(Impl(*std::move(lines), options));
   impl->places = *places;
   impl->columns = columns.size();
   // With named columns the first line may be data already.

@@ -17,7 +17,7 @@ const std::string kRow = "a row is `t tx ty tz qx qy qz qw`";
 Expected<TimedPose> parse_row(const std::vector<std::string_view>& fields, const std::string& where) {
   if (fields.size() != 8) return Error{where, text(fields.size(), " values instead of 8"), kRow};
   TimedPose row;
-  if (!parse_decimal(fields[0], 9, row.t))
+  if (!parse_decimal(fields[0], 9, row.t) || row.t > kLargestTimeNs || row.t < -kLargestTimeNs)
     return Error{where, text("'", fields[0], "' is not a time in seconds"), kRow};
   std::array<double, 7> v{};
   for (std::size_t k = 0; k < 7; ++k) {

@@ -112,8 +112,8 @@ void ConfigTable::add_choice(const std::string& key, const std::vector<std::stri
                              std::function<void(std::size_t)> set) {
   std::string list;
   for (const auto& n : names) list += (list.empty() ? "" : " | ") + n;
-  add_entry({key, "", help + " (" + list + ")", false, [names, get] { return names[get()]; },
-             [names, set, list](const std::string& s) -> std::string {
+  add_entry({key, "", help + " (" + list + ")", false, [names, get = std::move(get)] { return names[get()]; },
+             [names, set = std::move(set), list](const std::string& s) -> std::string {
                const auto it = std::find(names.begin(), names.end(), s);
                if (it == names.end()) return "'" + s + "' is none of " + list;
                set(static_cast<std::size_t>(it - names.begin()));

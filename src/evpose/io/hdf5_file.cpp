@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/hdf5_file.h"
+
+#include <hdf5.h>
+
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+
+#include "evpose/io/atomic_file.h"
+#include "evpose/io/input_file.h"
+
+namespace evpose {
+namespace {
+
+static_assert(std::is_same_v<hid_t, std::int64_t>, "Hdf5Handle holds identifiers as 64-bit numbers");
+
+void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+Hdf5Handle own(hid_t id, herr_t (*close)(hid_t)) { return {id, close}; }
+
+hid_t memory_type(NumberType type) {
+  switch (type) {
+    case NumberType::i8:
+      return H5T_NATIVE_INT8;
+    case NumberType::u8:
+      return H5T_NATIVE_UINT8;
+    case NumberType::i16:
+      return H5T_NATIVE_INT16;
+    case NumberType::u16:
+      return H5T_NATIVE_UINT16;
+    case NumberType::i32:
+      return H5T_NATIVE_INT32;
+    case NumberType::u32:
+      return H5T_NATIVE_UINT32;
+    case NumberType::i64:
+      return H5T_NATIVE_INT64;
+    case NumberType::u64:
+      return H5T_NATIVE_UINT64;
+    case NumberType::f32:
+      return H5T_NATIVE_FLOAT;
+    case NumberType::f64:
+      return H5T_NATIVE_DOUBLE;
+  }
+  return H5I_INVALID_HID;
+}
+
+std::string filter_name(H5Z_filter_t id) {
+  switch (id) {
+    case 307:
+      return "bzip2";
+    case 32000:
+      return "LZF";
+    case 32001:
+      return "Blosc";
+    case 32004:
+      return "LZ4";
+    case 32008:
+      return "bitshuffle";
+    case 32015:
+      return "Zstandard";
+    case 0x8ECF:
+      return "ECF";
+    default:
+      return "filter";
+  }
+}
+
+/// The first filter of the dataset that cannot be run here, in words; empty if none.
+std::string missing_filter(hid_t properties) {
+  for (int i = 0; i < H5Pget_nfilters(properties); ++i) {
+    unsigned flags = 0, config = 0;
+    std::size_t values = 0;
+    const H5Z_filter_t id =
+        H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &values, nullptr, 0, nullptr, &config);
+    if (id >= 0 && H5Zfilter_avail(id) <= 0) return text(filter_name(id), " (HDF5 filter ", id, ")");
+  }
+  return "";
+}
+
+/// Bytes of one stored chunk; 0 when the dataset has none.
+double chunk_bytes(hid_t properties, std::size_t item) {
+  if (H5Pget_layout(properties) != H5D_CHUNKED) return 0;
+  hsize_t dims[H5S_MAX_RANK] = {};
+  const int rank = H5Pget_chunk(properties, H5S_MAX_RANK, dims);
+  double bytes = static_cast<double>(item);
+  for (int i = 0; i < rank; ++i) bytes *= static_cast<double>(dims[i]);
+  return bytes;
+}
+
+}  // namespace
+
+Hdf5Handle::Hdf5Handle(Hdf5Handle&& other) noexcept
+    : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
+
+Hdf5Handle& Hdf5Handle::operator=(Hdf5Handle&& other) noexcept {
+  if (this == &other) return *this;
+  reset();
+  id_ = std::exchange(other.id_, -1);
+  close_ = other.close_;
+  return *this;
+}
+
+bool Hdf5Handle::reset() {
+  const std::int64_t id = std::exchange(id_, -1);
+  return id < 0 || close_(id) >= 0;
+}
+
+std::size_t size_of(NumberType type) { return H5Tget_size(memory_type(type)); }
+
+Expected<Hdf5File> Hdf5File::open(const std::string& path) {
+  silence();
+  const auto plain = open_to_read(path);
+  if (!plain) return plain.error();
+  if (plain->size == 0) return Error{path, "the file is empty", "copy it again"};
+  if (H5Fis_hdf5(path.c_str()) <= 0)
+    return Error{path, text("is not an HDF5 file (", plain->size, " bytes)"),
+                 "copy it again, or name another format"};
+  Hdf5File file;
+  file.path_ = path;
+  file.size_ = plain->size;
+  file.id_ = own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!file.id_)
+    return Error{path, text("truncated or damaged HDF5 file (", plain->size, " bytes)"), "copy it again"};
+  return file;
+}
+
+Expected<Hdf5File> Hdf5File::create(const TemporaryFile& temporary) {
+  silence();
+  Hdf5File file;
+  file.path_ = temporary.target();
+  file.id_ = own(H5Fcreate(temporary.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  if (!file.id_) return file.failed("cannot be written");
+  return file;
+}
+
+Error Hdf5File::failed(const std::string& what) const {
+  return Error{path_, what, "check the free space of the disk"};
+}
+
+bool Hdf5File::has(const std::string& object) const {
+  // Each link on the way must exist before the next may be asked for.
+  for (std::size_t slash = object.find('/', 1);; slash = object.find('/', slash + 1)) {
+    if (H5Lexists(id_.get(), object.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
+    if (slash == std::string::npos) break;
+  }
+  return H5Oexists_by_name(id_.get(), object.c_str(), H5P_DEFAULT) > 0;
+}
+
+std::vector<std::string> Hdf5File::root_groups() const {
+  std::vector<std::string> names;
+  const auto visit = [](hid_t, const char* name, const H5L_info_t*, void* out) -> herr_t {
+    auto& list = *static_cast<std::vector<std::string>*>(out);
+    list.emplace_back(name);
+    return list.size() < 1000 ? 0 : 1;
+  };
+  H5Literate(id_.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, visit, &names);
+  std::erase_if(names, [&](const std::string& name) {
+    const auto object = own(H5Oopen(id_.get(), name.c_str(), H5P_DEFAULT), H5Oclose);
+    return !object || H5Iget_type(object.get()) != H5I_GROUP;
+  });
+  return names;
+}
+
+Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions) const {
+  const std::string where = path_ + ": " + name;
+  if (!has(name)) return Error{path_, "no dataset " + name, "is it the right file?"};
+  Hdf5Dataset out;
+  out.path_ = path_;
+  out.name_ = name;
+  out.id_ = own(H5Dopen2(id_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!out.id_) return Error{where, "is not a readable dataset", "copy the file again"};
+  const auto type = own(H5Dget_type(out.id_.get()), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(type.get());
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM)
+    return Error{where, "does not hold numbers", "is it the right file?"};
+  out.floating_ = kind == H5T_FLOAT;
+  const auto space = own(H5Dget_space(out.id_.get()), H5Sclose);
+  const int rank = H5Sget_simple_extent_ndims(space.get());
+  if (rank < 0 || (dimensions >= 0 && rank != dimensions))
+    return Error{where, text("has ", rank, " dimensions instead of ", dimensions), "is it the right file?"};
+  hsize_t dims[H5S_MAX_RANK] = {};
+  H5Sget_simple_extent_dims(space.get(), dims, nullptr);
+  out.shape_.assign(dims, dims + rank);
+  const auto properties = own(H5Dget_create_plist(out.id_.get()), H5Pclose);
+  if (const std::string filter = missing_filter(properties.get()); !filter.empty())
+    return Error{where, "is compressed with " + filter + ", which is not installed",
+                 "install that HDF5 plug-in, or rewrite the file by h5repack -f GZIP=4"};
+  // Deflate makes at most 1032 bytes of one; anything beyond is a damaged header, or content that was never
+  // written.
+  double bytes = static_cast<double>(H5Tget_size(type.get()));
+  const double most = 1100.0 * static_cast<double>(size_);
+  if (chunk_bytes(properties.get(), static_cast<std::size_t>(bytes)) > std::min(most, 1e9))
+    return Error{where, "has larger chunks than the file can hold", "the file is damaged; copy it again"};
+  for (const auto n : out.shape_) bytes *= static_cast<double>(n);
+  if (bytes > most)
+    return Error{where, text("claims ", bytes, " bytes, the file has ", size_),
+                 "the file is damaged; copy it again"};
+  return out;
+}
+
+Status Hdf5Dataset::read(NumberType type, std::uint64_t first, std::uint64_t count, void* out) const {
+  const std::uint64_t all = rows();
+  EVPOSE_CHECK(first <= all && count <= all - first);
+  if (count == 0) return {};
+  const auto file_space = own(H5Dget_space(id_.get()), H5Sclose);
+  Hdf5Handle memory_space;
+  if (!shape_.empty()) {
+    std::vector<hsize_t> offset(shape_.size(), 0), extent(shape_.begin(), shape_.end());
+    offset[0] = first;
+    extent[0] = count;
+    H5Sselect_hyperslab(file_space.get(), H5S_SELECT_SET, offset.data(), nullptr, extent.data(), nullptr);
+    memory_space = own(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
+  }
+  const hid_t memory = shape_.empty() ? H5S_ALL : memory_space.get();
+  if (H5Dread(id_.get(), memory_type(type), memory, shape_.empty() ? H5S_ALL : file_space.get(), H5P_DEFAULT,
+              out) < 0)
+    return Error{path_ + ": " + name_, text("rows ", first, " to ", first + count - 1, " cannot be read"),
+                 "the file is truncated or damaged; copy it again"};
+  return {};
+}
+
+bool Hdf5Dataset::has_attribute(const std::string& name) const {
+  return H5Aexists(id_.get(), name.c_str()) > 0;
+}
+
+std::optional<std::uint32_t> Hdf5Dataset::attribute_u32(const std::string& name) const {
+  if (!has_attribute(name)) return std::nullopt;
+  const auto attribute = own(H5Aopen(id_.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
+  const auto space = own(H5Aget_space(attribute.get()), H5Sclose);
+  std::uint32_t value = 0;
+  if (H5Sget_simple_extent_npoints(space.get()) != 1 ||
+      H5Aread(attribute.get(), H5T_NATIVE_UINT32, &value) < 0)
+    return std::nullopt;
+  return value;
+}
+
+}  // namespace evpose

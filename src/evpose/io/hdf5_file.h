@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evpose/core/error.h"
+
+namespace evpose {
+
+class TemporaryFile;
+
+/// Owns one identifier of the HDF5 library.
+class Hdf5Handle {
+ public:
+  using Close = int (*)(std::int64_t);
+
+  Hdf5Handle() = default;
+  Hdf5Handle(std::int64_t id, Close close) : id_(id), close_(close) {}
+  Hdf5Handle(Hdf5Handle&& other) noexcept;
+  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept;
+  ~Hdf5Handle() { reset(); }
+
+  std::int64_t get() const { return id_; }
+  explicit operator bool() const { return id_ >= 0; }
+  /// False when closing failed, as it does when the disk is full.
+  bool reset();
+
+ private:
+  std::int64_t id_ = -1;
+  Close close_ = nullptr;
+};
+
+enum class NumberType { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
+std::size_t size_of(NumberType type);
+
+using Hdf5Shape = std::vector<std::uint64_t>;
+
+/// A dataset open to be read, its filters available. Errors name file and dataset.
+class Hdf5Dataset {
+ public:
+  const std::string& name() const { return name_; }
+  const Hdf5Shape& shape() const { return shape_; }
+  std::uint64_t rows() const { return shape_.empty() ? 1 : shape_[0]; }
+  bool is_floating() const { return floating_; }
+
+  /// Rows [first, first + count), as `type`, in C order.
+  Status read(NumberType type, std::uint64_t first, std::uint64_t count, void* out) const;
+  bool has_attribute(const std::string& name) const;
+  std::optional<std::uint32_t> attribute_u32(const std::string& name) const;
+
+ private:
+  friend class Hdf5File;
+  std::string path_, name_;
+  Hdf5Handle id_;
+  Hdf5Shape shape_;
+  bool floating_ = false;
+};
+
+/// An HDF5 file, to be read or being written. The library's own messages are silenced.
+class Hdf5File {
+ public:
+  /// Errors: no such file, no HDF5, truncated.
+  static Expected<Hdf5File> open(const std::string& path);
+  /// Writes to the temporary file, whose target errors name. Superblock and types as HDF5 1.8 and later read
+  /// them; no time stamps, so that same content gives same bytes.
+  static Expected<Hdf5File> create(const TemporaryFile& temporary);
+
+  const std::string& path() const { return path_; }
+  std::int64_t size() const { return size_; }  ///< bytes of the file when opened
+
+  bool has(const std::string& object) const;
+  std::vector<std::string> root_groups() const;  ///< sorted by name
+  /// Errors: absent, not numbers, more than `dimensions` (any if -1), compressed with a filter that is not
+  /// installed, more content than the file can hold.
+  Expected<Hdf5Dataset> dataset(const std::string& name, int dimensions = -1) const;
+
+  bool has_attribute(const std::string& object, const std::string& name) const;
+  std::optional<std::vector<double>> attribute_numbers(const std::string& object,
+                                                       const std::string& name) const;
+  std::optional<std::vector<std::string>> attribute_strings(const std::string& object,
+                                                            const std::string& name) const;
+
+  Status make_group(const std::string& name);
+  /// Chunks of `chunk_rows` rows with shuffle and deflate level 4; the first dimension can grow.
+  Expected<Hdf5Handle> make_dataset(const std::string& name, NumberType type, const Hdf5Shape& shape,
+                                    std::uint64_t chunk_rows = 65536);
+  Status append(const Hdf5Handle& dataset, NumberType type, std::uint64_t rows_before, std::uint64_t rows,
+                const void* data);
+  /// On a group or dataset; `shape` empty for a scalar.
+  Status set_attribute(const std::string& object, const std::string& name, NumberType type,
+                       const Hdf5Shape& shape, const void* data);
+  Status set_attribute(const std::string& object, const std::string& name, const std::string& value);
+  Status set_attribute(const std::string& object, const std::string& name,
+                       const std::vector<std::string>& values);
+  /// Errors: writing failed.
+  Status close();
+
+ private:
+  Error failed(const std::string& what) const;
+
+  std::string path_;
+  std::int64_t size_ = 0;
+  Hdf5Handle id_;
+};
+
+}  // namespace evpose

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <set>
+
+#include "evpose/report/overlay.h"
+#include "evpose/report/page.h"
+#include "evpose/report/png.h"
+#include "evpose/report/run_folder.h"
+#include "evpose/report/series.h"
+#include "evpose/report/state_log.h"
+#include "evpose/report/summary.h"
+
+namespace evpose {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// A folder of its own for each test.
+class Folder {
+ public:
+  Folder() {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    path_ = fs::path(testing::TempDir()) / (std::string("evpose_report_") + test->name());
+    fs::remove_all(path_);
+    fs::create_directories(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+  std::vector<std::string> names() const {
+    std::vector<std::string> out;
+    for (const auto& entry : fs::directory_iterator(path_)) out.push_back(entry.path().filename());
+    return out;
+  }
+
+ private:
+  fs::path path_;
+};
+
+Pose circle(double t_s) { return {so3::exp({0, 0, t_s}), {std::cos(t_s), std::sin(t_s), 1.5}}; }
+
+Update update_at(int i, double wall_s) {
+  Update u;
+  u.t = i * 10 * kNsPerMs;
+  u.T_map_body = circle(0.01 * i);
+  u.T_map_body.p.x() += 0.002;
+  u.velocity = Eigen::Vector3d(-std::sin(0.01 * i), std::cos(0.01 * i), 0);
+  u.covariance = 4e-6 * Matrix6d::Identity();
+  u.health = i == 0   ? Health::initialising
+             : i < 80 ? Health::tracking
+             : i < 90 ? Health::lost
+                      : Health::tracking;
+  if (i == 0 || i == 80 || i == 90) u.reason = "because, \"so\"";
+  u.events_read = 1000 + i;
+  u.events_kept = 800;
+  u.points = 300;
+  u.points_matched = 250;
+  u.times = {wall_s, wall_s, wall_s, 2 * wall_s, wall_s};
+  return u;
+}
+
+RunSummary a_summary() {
+  RunSummary s;
+  s.title = "a <b>circle</b> </script><script>alert(1)</script> & more";
+  s.T_body_cam = {so3::exp({0.1, 0, 0}), {0.05, 0, 0}};
+  for (int i = -50; i <= 250; ++i) s.truth.push_back({i * 10 * kNsPerMs, circle(0.01 * i)});
+  s.map_points = {{1, 2, 3}, {0, 0, 0}, {1e6, 0, 0}};
+  s.events_read = 120'000;
+  s.events_kept = 90'000;
+  s.hot_pixels = {{3, 4}};
+  s.wall_s = 0.5;
+  s.cpu_s = 0.4;
+  s.peak_memory_mb = 60;
+  return s;
+}
+
+struct Settings {
+  double rate_hz = 300;
+  bool on = true;
+  std::string name = "x: y";
+};
+
+Expected<RunOutcome> write_run(const std::string& path, double wall_s = 1e-4) {
+  auto folder = RunFolder::create(path);
+  if (!folder) return folder.error();
+  for (int i = 0; i <= 150; ++i) folder->add(update_at(i, wall_s));
+  folder->add_overlay("at 1 s", RgbImage(8, 6));
+  Settings config;
+  ConfigTable table;
+  table.add("tracker.rate_hz", config.rate_hz, "Hz", "updates", {1, 1000});
+  table.add("tracker.on", config.on, "a switch");
+  table.add("tracker.name", config.name, "a name");
+  return folder->finish(a_summary(), table);
+}
+
+TEST(Png, DecodesToTheSameImage) {
+  RgbImage image(5, 3);
+  std::iota(image.rgb.begin(), image.rgb.end(), std::uint8_t{7});
+  const std::string bytes = encode_png(image);
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
+  png.format = PNG_FORMAT_RGB;
+  ASSERT_EQ(png.width, 5u);
+  ASSERT_EQ(png.height, 3u);
+  std::vector<std::uint8_t> rgb(image.rgb.size());
+  ASSERT_NE(png_image_finish_read(&png, nullptr, rgb.data(), 0, nullptr), 0);
+  EXPECT_EQ(rgb, image.rgb);
+}
+
+TEST(Overlay, OnIsRedOffIsBlueMatchedIsGreenNothingIsWhite) {
+  const std::vector<float> decay{1, -1, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0, 0};
+  const std::vector<OverlayPoint> points{
+      {3, 3, true}, {-100, 2, true}, {1e30f, 0, true}, {std::nanf(""), 0, true}, {3.4f, 0, false}};
+  RgbImage image = draw_overlay(4, 4, decay, points);
+  const auto is = [&](int x, int y) { return std::vector<int>(image.pixel(x, y), image.pixel(x, y) + 3); };
+  EXPECT_GT(is(0, 0)[0], is(0, 0)[2] + 100);
+  EXPECT_GT(is(1, 0)[2], is(1, 0)[0] + 100);
+  EXPECT_EQ(is(0, 2), (std::vector<int>{255, 255, 255}));
+  EXPECT_GT(is(2, 2)[0], is(2, 2)[2]);
+  EXPECT_GT(is(3, 3)[1], is(3, 3)[0] + 100);
+  EXPECT_EQ(is(3, 0)[0], is(3, 0)[1]);
+}
+
+TEST(Series, ThinningKeepsPeaksAndEnds) {
+  Series s;
+  for (int i = 0; i < 100'000; ++i) s.add(i, i == 54'321 ? 9 : i == 777 ? -9 : std::sin(1e-3 * i));
+  const Series few = thin(s, 1000);
+  EXPECT_LE(few.y.size(), 1000u);
+  EXPECT_GE(few.y.size(), 900u);
+  EXPECT_EQ(*std::max_element(few.y.begin(), few.y.end()), 9);
+  EXPECT_EQ(*std::min_element(few.y.begin(), few.y.end()), -9);
+  EXPECT_EQ(few.t.front(), 0);
+  EXPECT_EQ(few.t.back(), 99'999);
+  EXPECT_TRUE(std::is_sorted(few.t.begin(), few.t.end()));
+  EXPECT_EQ(thin(few, 1000).y, few.y);
+}
+
+TEST(Series, SpreadIndicesReachBothEnds) {
+  EXPECT_EQ(spread_indices(10, 3), (std::vector<std::size_t>{0, 4, 9}));
+  EXPECT_EQ(spread_indices(2, 5), (std::vector<std::size_t>{0, 1}));
+  EXPECT_TRUE(spread_indices(0, 5).empty());
+  EXPECT_EQ(spread_indices(7, 1), (std::vector<std::size_t>{0}));
+}
+
+TEST(Series, HistogramSharesAddUpToOne) {
+  const LogHistogram h = log_histogram({0, 0.001, 0.5, 0.5, 3, 1e9}, 0.001, 10, 4);
+  EXPECT_EQ(h.edges.size(), h.shares.size() + 1);
+  EXPECT_NEAR(std::accumulate(h.shares.begin(), h.shares.end(), 0.0), 1, 1e-12);
+  EXPECT_NEAR(h.shares.front(), 2.0 / 6, 1e-12);
+  EXPECT_NEAR(h.shares.back(), 1.0 / 6, 1e-12);
+}
+
+TEST(Series, Base64OfTheStandardsExamples) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("\xff\xfe"), "//4=");
+}
+
+TEST(RunFolder, HoldsAllFilesAndTheAgreedWords) {
+  const Folder folder;
+  const auto out = write_run(folder.file("run"));
+  ASSERT_TRUE(out) << out.error().line();
+  for (const char* name : {"trajectory.tum", "trajectory_camera.tum", "states.csv", "latency.csv",
+                           "summary.json", "config.yaml", "report.html"})
+    EXPECT_TRUE(fs::exists(folder.file("run/") + name)) << name;
+  EXPECT_EQ(folder.names().size(), 1u);  // nothing temporary is left beside it
+
+  const Json j = Json::parse(content(folder.file("run/summary.json")));
+  EXPECT_EQ(j["status"], "tracking");
+  EXPECT_NEAR(j["accuracy"]["ate_mean_mm"], 2, 1e-5);
+  EXPECT_EQ(j["accuracy"]["alignment"], "none");
+  EXPECT_EQ(j["accuracy"]["pairs"], 141);
+  EXPECT_NEAR(j["accuracy"]["nees6_mean"], 1.0 / 6, 1e-3);
+  EXPECT_TRUE(j["accuracy"].contains("velocity_rmse_mm_s"));
+  EXPECT_NEAR(j["coverage"], 1 - 6.0 / 150, 1e-5);  // between 0.79 and 0.90: instants 0.82 ... 0.87
+  EXPECT_EQ(j["lost"].size(), 1u);
+  EXPECT_NEAR(j["latency"]["update_p50_ms"], 0.5, 1e-6);
+  EXPECT_NEAR(j["latency"]["stages"]["register"]["p99_ms"], 0.2, 1e-6);
+  EXPECT_EQ(j["events"]["read"], 120'000);
+  EXPECT_NEAR(j["events"]["rate_mev_s"], 0.24, 1e-9);
+  EXPECT_EQ(j["events"]["hot_pixels"][0][1], 4);
+  EXPECT_NEAR(j["resources"]["cpu_share"], 0.4 / 1.5, 1e-5);
+  EXPECT_EQ(j["health"].size(), 4u);
+  EXPECT_EQ(j["health"][2]["state"], "lost");
+  EXPECT_EQ(j["health"][2]["reason"], "because, \"so\"");
+  EXPECT_EQ(j["config"]["tracker.rate_hz"], 300);
+  EXPECT_EQ(j["config"]["tracker.on"], true);
+  EXPECT_EQ(j["config"]["tracker.name"], "x: y");
+  EXPECT_TRUE(j["versions"].contains("evpose"));
+  EXPECT_EQ(std::count(out->text.begin(), out->text.end(), '\n'), 4);
+}
+
+TEST(RunFolder, RowsHaveAsManyFieldsAsTheHeaderAndLostPosesAreNoTrajectory) {
+  const Folder folder;
+  ASSERT_TRUE(write_run(folder.file("run")));
+  std::ifstream states(folder.file("run/states.csv"));
+  std::string header, row;
+  std::getline(states, header);
+  std::getline(states, row);
+  std::getline(states, row);  // one without a reason, so without commas in quotes
+  EXPECT_EQ(std::count(header.begin(), header.end(), ','), std::count(row.begin(), row.end(), ','));
+  const std::string trajectory = content(folder.file("run/trajectory.tum"));
+  EXPECT_EQ(std::count(trajectory.begin(), trajectory.end(), '\n'), 1 + 151 - 10);
+}
+
+TEST(RunFolder, SameEstimatesGiveTheSameBytes) {
+  const Folder folder;
+  ASSERT_TRUE(write_run(folder.file("a"), 1e-4));
+  ASSERT_TRUE(write_run(folder.file("b"), 7e-4));
+  for (const char* name : {"trajectory.tum", "trajectory_camera.tum", "states.csv", "config.yaml"})
+    EXPECT_EQ(content(folder.file("a/") + name), content(folder.file("b/") + name)) << name;
+  EXPECT_NE(content(folder.file("a/latency.csv")), content(folder.file("b/latency.csv")));
+}
+
+TEST(RunFolder, ReplacesAnEarlierRunOnlyWhenFinished) {
+  const Folder folder;
+  ASSERT_TRUE(write_run(folder.file("run/")));
+  const std::string before = content(folder.file("run/latency.csv"));
+  {
+    auto unfinished = RunFolder::create(folder.file("run"));
+    ASSERT_TRUE(unfinished);
+    unfinished->add(update_at(0, 1));
+  }
+  EXPECT_EQ(content(folder.file("run/latency.csv")), before);
+  EXPECT_EQ(folder.names().size(), 1u);
+  ASSERT_TRUE(write_run(folder.file("run"), 3e-4));
+  EXPECT_NE(content(folder.file("run/latency.csv")), before);
+  EXPECT_EQ(folder.names().size(), 1u);
+}
+
+TEST(RunFolder, LeavesOtherThingsAlone) {
+  const Folder folder;
+  fs::create_directories(folder.file("mine"));
+  std::ofstream(folder.file("mine/thesis.tex")) << "work of years";
+  std::ofstream(folder.file("file")) << "a file";
+  fs::create_directories(folder.file("empty"));
+  EXPECT_NE(RunFolder::create(folder.file("mine")).error().line().find("thesis.tex"), std::string::npos);
+  EXPECT_FALSE(RunFolder::create(folder.file("file")));
+  EXPECT_FALSE(RunFolder::create(folder.file("no/such/parent")));
+  EXPECT_FALSE(RunFolder::create(""));
+  EXPECT_FALSE(RunFolder::create("/"));
+  EXPECT_FALSE(RunFolder::create(".."));
+  EXPECT_TRUE(RunFolder::create(folder.file("empty")));
+  EXPECT_EQ(folder.names().size(), 3u);
+}
+
+TEST(RunFolder, OfARunWithoutUpdatesOrTruthIsComplete) {
+  const Folder folder;
+  auto run = RunFolder::create(folder.file("run"));
+  ASSERT_TRUE(run);
+  ConfigTable table;
+  RunSummary summary;
+  summary.truth = a_summary().truth;
+  const auto out = run->finish(summary, table);
+  ASSERT_TRUE(out) << out.error().line();
+  EXPECT_EQ(Json::parse(content(folder.file("run/summary.json")))["status"], "lost");
+  EXPECT_FALSE(out->score);
+}
+
+TEST(Page, NothingInTheDataCanEndItsElement) {
+  const Folder folder;
+  ASSERT_TRUE(write_run(folder.file("run")));
+  const std::string page = content(folder.file("run/report.html"));
+  // The shell has three scripts; whatever the title says, there are no more.
+  std::size_t ends = 0;
+  for (std::size_t at = page.find("</script"); at != std::string::npos; at = page.find("</script", at + 1))
+    ++ends;
+  EXPECT_EQ(ends, 3u);
+  EXPECT_EQ(page.find("<b>circle"), std::string::npos);
+  EXPECT_NE(page.find("&lt;b&gt;circle"), std::string::npos);
+
+  const std::string open = R"(id="run">)";
+  const std::size_t begin = page.find(open) + open.size();
+  const Json data = Json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+  EXPECT_EQ(data["title"], a_summary().title);
+  EXPECT_EQ(data["paths"].size(), 2u);
+  EXPECT_EQ(data["map"]["x"].size(), 2u);  // the far point is left out
+}
+
+TEST(Page, KeepsAtSignsOfTheData) {
+  const std::string page = page_html("a@TITLE@b", R"({"x": "@SCRIPT@"})");
+  EXPECT_NE(page.find("<title>a@TITLE@b</title>"), std::string::npos);
+  EXPECT_NE(page.find(R"({"x": "@SCRIPT@"})"), std::string::npos);
+}
+
+TEST(Summary, ScoreWordsAreThoseOfTheSummary) {
+  std::vector<TimedPose> truth;
+  for (int i = 0; i < 200; ++i) truth.push_back({i * 10 * kNsPerMs, circle(0.01 * i)});
+  const TrajectoryScore score = score_trajectory({truth, truth, {}, {}, {}}, {});
+  const Json j = Json::parse(score_json(score));
+  const std::set<std::string> agreed{"ate_mean_mm", "ate_median_mm", "ate_rmse_mm",  "ate_p95_mm",
+                                     "ate_max_mm",  "are_mean_deg",  "are_rmse_deg", "are_p95_deg",
+                                     "rte_10ms_mm", "rte_100ms_mm",  "rre_10ms_deg", "rre_100ms_deg",
+                                     "lag_ms",      "jitter_mm",     "alignment",    "pairs"};
+  for (const std::string& word : agreed) EXPECT_TRUE(j["accuracy"].contains(word)) << word;
+  EXPECT_EQ(j["coverage"], 1);
+  EXPECT_NE(score_text(score).find("ate_mean_mm"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace evpose

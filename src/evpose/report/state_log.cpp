@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/report/state_log.h"
+
+#include <cinttypes>
+#include <cstdio>
+
+namespace evpose {
+namespace {
+
+std::array<double, 5> stages_ms(const StageTimes& t) {
+  return {1e3 * t.events_s, 1e3 * t.predict_s, 1e3 * t.choose_s, 1e3 * t.register_s, 1e3 * t.fuse_s};
+}
+
+/// Seconds with all nine decimals.
+std::string seconds_text(TimeNs t) {
+  const bool negative = t < 0;
+  const std::uint64_t magnitude =
+      negative ? 0 - static_cast<std::uint64_t>(t) : static_cast<std::uint64_t>(t);
+  char out[40];
+  std::snprintf(out, sizeof out, "%s%" PRIu64 ".%09" PRIu64, negative ? "-" : "", magnitude / 1'000'000'000,
+                magnitude % 1'000'000'000);
+  return out;
+}
+
+void append(std::string* row, double value) {
+  char out[40];
+  std::snprintf(out, sizeof out, ",%.9g", value);
+  *row += out;
+}
+
+void append(std::string* row, const Eigen::Vector3d& v) {
+  for (int i = 0; i < 3; ++i) append(row, v[i]);
+}
+
+/// Text as a CSV field.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"') out += '"';
+    out += c == '\n' || c == '\r' ? ' ' : c;
+  }
+  return out + '"';
+}
+
+}  // namespace
+
+Matrix6d StateRow::covariance_matrix() const {
+  Matrix6d out;
+  std::size_t k = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j, ++k) out(i, j) = out(j, i) = covariance[k];
+  return out;
+}
+
+void StateLog::add(const Update& u) {
+  StateRow row;
+  row.t = u.t;
+  row.T_map_body = u.T_map_body;
+  row.velocity = u.velocity;
+  std::size_t k = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j, ++k) row.covariance[k] = static_cast<float>(u.covariance(i, j));
+  row.health = u.health;
+  row.events_read = u.events_read;
+  row.events_kept = u.events_kept;
+  row.points = u.points;
+  row.points_matched = u.points_matched;
+  const std::array<double, 5> ms = stages_ms(u.times);
+  for (std::size_t i = 0; i < ms.size(); ++i) row.stages_ms[i] = static_cast<float>(ms[i]);
+  if (health.empty() || health.back().health != u.health) health.push_back({u.t, u.health, u.reason});
+  rows.push_back(row);
+}
+
+std::string states_csv_header() {
+  std::string out =
+      "t_s,x_m,y_m,z_m,qx,qy,qz,qw,vx_m_s,vy_m_s,vz_m_s,gyro_bias_x_rad_s,gyro_bias_y_rad_s,gyro_bias_z_rad_"
+      "s,"
+      "accel_bias_x_m_s2,accel_bias_y_m_s2,accel_bias_z_m_s2";
+  // Upper triangle of the covariance of (translation in the map, rotation in the body), m and rad.
+  const char* const axes[] = {"x", "y", "z", "rx", "ry", "rz"};
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) out += std::string(",cov_") + axes[i] + "_" + axes[j];
+  return out + ",health,accepted,events_read,events_kept,points,points_matched,residual,innovation,reason\n";
+}
+
+std::string states_csv_row(const Update& u) {
+  std::string row = seconds_text(u.t);
+  append(&row, u.T_map_body.p);
+  for (const double c : {u.T_map_body.q.x(), u.T_map_body.q.y(), u.T_map_body.q.z(), u.T_map_body.q.w()})
+    append(&row, c);
+  append(&row, u.velocity);
+  append(&row, u.gyro_bias);
+  append(&row, u.accel_bias);
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) append(&row, u.covariance(i, j));
+  char counts[100];
+  std::snprintf(counts, sizeof counts, ",%s,%d,%d,%d,%d,%d", to_string(u.health), u.accepted ? 1 : 0,
+                u.events_read, u.events_kept, u.points, u.points_matched);
+  row += counts;
+  append(&row, u.residual);
+  append(&row, u.innovation);
+  return row + (u.reason.empty() ? "," : "," + quoted(u.reason)) + "\n";
+}
+
+std::string latency_csv_header() {
+  std::string out = "t_s";
+  for (const char* name : kStageNames) out += std::string(",") + name + "_ms";
+  return out + "\n";
+}
+
+std::string latency_csv_row(const Update& u) {
+  std::string row = seconds_text(u.t);
+  for (const double ms : stages_ms(u.times)) append(&row, ms);
+  return row + "\n";
+}
+
+}  // namespace evpose

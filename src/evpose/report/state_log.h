@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "evpose/core/pose.h"
+#include "evpose/tracker/update.h"
+
+namespace evpose {
+
+/// What a run folder remembers of an update until it is finished: about a quarter of a kilobyte.
+struct StateRow {
+  TimeNs t = 0;
+  Pose T_map_body;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< map frame, m/s
+  std::array<float, 21> covariance{};                  ///< upper triangle by rows
+  Health health = Health::waiting;
+  std::int32_t events_read = 0, events_kept = 0, points = 0, points_matched = 0;
+  std::array<float, 5> stages_ms{};  ///< in the order of kStageNames
+
+  Matrix6d covariance_matrix() const;
+  /// The tracker stands by the pose: one that it calls waiting or lost is not part of the trajectory.
+  bool valid() const { return health != Health::waiting && health != Health::lost; }
+};
+
+inline constexpr std::array<const char*, 5> kStageNames{"events", "predict", "choose", "register", "fuse"};
+
+struct HealthChange {
+  TimeNs t = 0;
+  Health health = Health::waiting;
+  std::string reason;
+};
+
+/// The updates of a run.
+struct StateLog {
+  std::vector<StateRow> rows;
+  std::vector<HealthChange> health;  ///< the first state, and each change
+
+  void add(const Update& update);
+};
+
+/// Columns and rows of states.csv, everything that does not depend on wall time.
+std::string states_csv_header();
+std::string states_csv_row(const Update& update);
+/// Columns and rows of latency.csv: wall time by stage.
+std::string latency_csv_header();
+std::string latency_csv_row(const Update& update);
+
+}  // namespace evpose

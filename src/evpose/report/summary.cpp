@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/report/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "evpose/core/version.h"
+#include "evpose/eval/statistics.h"
+#include "evpose/report/series.h"
+
+namespace evpose {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+LatencyFigures figures(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return {quantile(values, 0.5), quantile(values, 0.99), values.back()};
+}
+
+double rounded(double value) { return evpose::rounded(value, 6); }
+
+double seconds(TimeNs t) { return static_cast<double>(t) / 1e9; }
+
+Json accuracy_json(const TrajectoryScore& score) {
+  Json out = Json::object();
+  for (const auto& [name, value] : score.words()) out[name] = rounded(value);
+  out["alignment"] = to_string(score.alignment);
+  out["pairs"] = score.pairs;
+  return out;
+}
+
+Json lost_json(const TrajectoryScore& score) {
+  Json out = Json::array();
+  for (const Stretch& s : score.lost) out.push_back({{"from_s", seconds(s.from)}, {"to_s", seconds(s.to)}});
+  return out;
+}
+
+Json latency_json(const LatencySummary& latency) {
+  Json stages = Json::object();
+  for (std::size_t i = 0; i < kStageNames.size(); ++i) {
+    const LatencyFigures& s = latency.stages[i];
+    stages[kStageNames[i]] = {
+        {"p50_ms", rounded(s.p50_ms)}, {"p99_ms", rounded(s.p99_ms)}, {"max_ms", rounded(s.max_ms)}};
+  }
+  return {{"update_p50_ms", rounded(latency.update.p50_ms)},
+          {"update_p99_ms", rounded(latency.update.p99_ms)},
+          {"update_max_ms", rounded(latency.update.max_ms)},
+          {"stages", stages}};
+}
+
+Json events_json(const RunSummary& summary) {
+  Json out = {{"read", summary.events_read}, {"kept", summary.events_kept}, {"shed", summary.events_shed}};
+  if (summary.wall_s > 0)
+    out["rate_mev_s"] = rounded(1e-6 * static_cast<double>(summary.events_read) / summary.wall_s);
+  out["hot_pixels"] = Json::array();
+  for (const auto& [x, y] : summary.hot_pixels) out["hot_pixels"].push_back({x, y});
+  return out;
+}
+
+double data_seconds(const StateLog& log) {
+  return log.rows.empty() ? 0 : to_seconds(log.rows.back().t - log.rows.front().t);
+}
+
+Json resources_json(const StateLog& log, const RunSummary& summary) {
+  Json out = Json::object();
+  // Processor time per second of data: 1 is one core kept busy by a live sensor.
+  if (data_seconds(log) > 0 && summary.cpu_s > 0)
+    out["cpu_share"] = rounded(summary.cpu_s / data_seconds(log));
+  if (summary.peak_memory_mb > 0) out["peak_memory_mb"] = rounded(summary.peak_memory_mb);
+  if (summary.wall_s > 0) out["wall_s"] = rounded(summary.wall_s);
+  return out;
+}
+
+Json health_json(const StateLog& log) {
+  Json out = Json::array();
+  for (const HealthChange& h : log.health)
+    out.push_back({{"t_s", seconds(h.t)}, {"state", to_string(h.health)}, {"reason", h.reason}});
+  return out;
+}
+
+Json config_json(const ConfigTable& config) {
+  Json out = Json::object();
+  for (const ConfigTable::Value& v : config.values()) {
+    const Json value = v.number ? Json::parse(v.value, nullptr, false) : Json(v.value);
+    out[v.key] = value.is_discarded() ? Json(v.value) : value;
+  }
+  return out;
+}
+
+/// Text that is not UTF-8 (a file's name can be) is mended, not refused.
+std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+std::string line(const char* format, auto... values) {
+  char out[300];
+  std::snprintf(out, sizeof out, format, values...);
+  return out;
+}
+
+}  // namespace
+
+std::optional<LatencySummary> summarise_latency(const StateLog& log) {
+  std::vector<double> update;
+  std::vector<std::vector<double>> stages(kStageNames.size());
+  double sum = 0;
+  for (const StateRow& row : log.rows) {
+    double after_newest_event = 0;
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+      stages[i].push_back(row.stages_ms[i]);
+      sum += row.stages_ms[i];
+      if (i > 0) after_newest_event += row.stages_ms[i];
+    }
+    update.push_back(after_newest_event);
+  }
+  if (!(sum > 0)) return std::nullopt;
+  LatencySummary out{figures(std::move(update)), {}};
+  for (auto& s : stages) out.stages.push_back(figures(std::move(s)));
+  return out;
+}
+
+std::string status_word(Health at_end) {
+  switch (at_end) {
+    case Health::tracking:
+      return "tracking";
+    case Health::initialising:
+    case Health::degraded:
+      return "degraded";
+    case Health::waiting:
+    case Health::lost:
+      return "lost";
+  }
+  return "lost";
+}
+
+std::string score_json(const TrajectoryScore& score) {
+  return dump({{"coverage", rounded(score.coverage)},
+               {"accuracy", accuracy_json(score)},
+               {"lost", lost_json(score)}});
+}
+
+std::string summary_json(const StateLog& log, const RunSummary& summary, const ConfigTable& config,
+                         const std::optional<TrajectoryScore>& score) {
+  Json out;
+  out["status"] = status_word(log.rows.empty() ? Health::waiting : log.rows.back().health);
+  if (score) {
+    out["coverage"] = rounded(score->coverage);
+    out["accuracy"] = accuracy_json(*score);
+    out["lost"] = lost_json(*score);
+  }
+  out["updates"] = log.rows.size();
+  if (const auto latency = summarise_latency(log)) out["latency"] = latency_json(*latency);
+  out["events"] = events_json(summary);
+  out["resources"] = resources_json(log, summary);
+  out["health"] = health_json(log);
+  out["versions"] = {{"evpose", version()}};
+  for (const auto& [name, number] : summary.versions) out["versions"][name] = number;
+  out["config"] = config_json(config);
+  return dump(out);
+}
+
+std::string score_text(const TrajectoryScore& score) {
+  std::string out = line("%-24s %zu", "pairs", score.pairs);
+  out += line("\n%-24s %.4f", "coverage", score.coverage);
+  out += line("\n%-24s %s", "alignment", to_string(score.alignment));
+  for (const auto& [name, value] : score.words()) out += line("\n%-24s %.6g", name.c_str(), value);
+  for (const Stretch& s : score.lost)
+    out += line("\n%-24s %.3f s .. %.3f s", "lost", seconds(s.from), seconds(s.to));
+  return out;
+}
+
+std::string summary_text(const StateLog& log, const RunSummary& summary,
+                         const std::optional<TrajectoryScore>& score) {
+  const Health at_end = log.rows.empty() ? Health::waiting : log.rows.back().health;
+  std::string out = line("%s at the end; %zu updates over %.2f s of data, %zu change(s) of health",
+                         status_word(at_end).c_str(), log.rows.size(), data_seconds(log),
+                         log.health.empty() ? 0 : log.health.size() - 1);
+  if (score && score->pairs > 0) {
+    out += line("\nposition error: mean %.2f mm, p95 %.2f mm, largest %.2f mm", score->ate_mm.mean,
+                score->ate_mm.p95, score->ate_mm.max);
+    out += line("\nrotation error: mean %.3f deg, p95 %.3f deg, largest %.3f deg; coverage %.1f %%",
+                score->are_deg.mean, score->are_deg.p95, score->are_deg.max, 100 * score->coverage);
+  } else {
+    out += "\nposition error: not known without ground truth";
+    out += "\nrotation error: not known without ground truth";
+  }
+  if (const auto latency = summarise_latency(log))
+    out += line("\nupdate: median %.2f ms, p99 %.2f ms after the newest event", latency->update.p50_ms,
+                latency->update.p99_ms);
+  else
+    out += "\nupdate: not timed";
+  const double kept = summary.events_read == 0 ? 0
+                                               : 100 * static_cast<double>(summary.events_kept) /
+                                                     static_cast<double>(summary.events_read);
+  return out + line("\nevents: %.3f million read, %.0f %% kept",
+                    1e-6 * static_cast<double>(summary.events_read), kept);
+}
+
+}  // namespace evpose

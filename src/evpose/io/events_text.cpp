@@ -168,8 +168,7 @@ Expected<std::int64_t> last_stamp(const std::string& path, const Layout& layout,
   const auto file = open_to_read(path);
   if (!file) return file.error();
   std::string tail(static_cast<std::size_t>(std::min(file->size, kTailBytes)), '\0');
-  if (std::fseek(file->stream.get(), static_cast<long>(file->size - static_cast<std::int64_t>(tail.size())),
-                 SEEK_SET) != 0 ||
+  if (::fseeko(file->stream.get(), file->size - static_cast<std::int64_t>(tail.size()), SEEK_SET) != 0 ||
       std::fread(tail.data(), 1, tail.size(), file->stream.get()) != tail.size())
     return Error{path, "cannot be read to its end", "check the disk"};
   std::vector<std::string_view> fields;

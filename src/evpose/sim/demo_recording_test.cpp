@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/demo_recording.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+
+#include "evpose/io/atomic_file.h"
+#include "evpose/io/recording.h"
+
+namespace evpose::sim {
+namespace {
+
+class DemoRecording : public ::testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::remove_all(base_); }
+  void TearDown() override { std::filesystem::remove_all(base_); }
+
+  std::string make(const std::string& name, DemoOptions options) {
+    options.size = {96, 72};
+    options.duration_s = 0.08;
+    const std::string folder = (base_ / name).string();
+    const Status made = make_demo_recording(folder, options, [&](double share) { last_share_ = share; });
+    EXPECT_TRUE(made.ok()) << (made.ok() ? "" : made.error().line());
+    return folder;
+  }
+  static std::map<std::string, std::string> bytes(const std::string& folder) {
+    std::map<std::string, std::string> all;
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+      all[entry.path().filename().string()] = read_text_file(entry.path().string()).value();
+    return all;
+  }
+
+  std::filesystem::path base_ =
+      std::filesystem::path(::testing::TempDir()) /
+      ("evpose_demo_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()));
+  double last_share_ = 0;
+};
+
+TEST_F(DemoRecording, SameSeedGivesTheSameBytesForAnyThreads) {
+  const auto one = bytes(make("one", {.seed = 3, .threads = 1}));
+  const auto two = bytes(make("two", {.seed = 3, .threads = 2}));
+  const auto other = bytes(make("other", {.seed = 4, .threads = 2}));
+  EXPECT_EQ(last_share_, 1);
+  ASSERT_EQ(one.size(), 8u);
+  for (const auto& [name, content] : one) {
+    EXPECT_EQ(content == two.at(name), true) << name;
+    const bool depends =
+        name == "events.h5" || name == "imu.csv" || name == "groundtruth.tum" || name == "scenario.yaml";
+    EXPECT_EQ(content != other.at(name), depends) << name;
+  }
+}
+
+TEST_F(DemoRecording, OpensAsARecording) {
+  const auto recording = open_recording(make("one", {}));
+  ASSERT_TRUE(recording) << recording.error().line();
+  EXPECT_TRUE(recording->has_imu);
+  EXPECT_EQ(recording->camera.size, (ImageSize{96, 72}));
+  const auto truth = read_groundtruth(*recording);
+  ASSERT_TRUE(truth) << truth.error().line();
+  EXPECT_EQ(truth->size(), 81u);
+  auto events = open_events(*recording, 1e-3);
+  ASSERT_TRUE(events) << events.error().line();
+  EventPacket packet;
+  std::size_t count = 0;
+  for (auto more = (*events)->next(packet); more && *more; more = (*events)->next(packet))
+    count += packet.events.size();
+  EXPECT_GT(count, 1000u);
+}
+
+TEST_F(DemoRecording, OptionsOutOfRangeAreRefusedByName) {
+  const auto refused = [&](DemoOptions options) {
+    const Status made = make_demo_recording((base_ / "never").string(), options, nullptr);
+    return made ? std::string("accepted") : made.error().where;
+  };
+  EXPECT_EQ(refused({.size = {16, 72}}), "demo size");
+  EXPECT_EQ(refused({.duration_s = -1}), "demo duration");
+  EXPECT_EQ(refused({.threads = 0}), "demo threads");
+  EXPECT_FALSE(std::filesystem::exists(base_));
+}
+
+}  // namespace
+}  // namespace evpose::sim

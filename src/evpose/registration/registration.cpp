@@ -38,9 +38,10 @@ NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationCo
     for (std::size_t i = begin; i < end; ++i) {
       double r = 0;
       Vector6d J;
-      if (!evaluate_point(problem, config.kernel, T_map_body, problem.points[i], &r, &J)) continue;
-      ++sum.seen;
-      if (1 - r >= kMatchedField) ++sum.matched;
+      if (evaluate_point(problem, config.kernel, T_map_body, problem.points[i], &r, &J)) {
+        ++sum.seen;
+        if (1 - r >= kMatchedField) ++sum.matched;
+      }
       // Tukey's biweight: a point without events (r = 1) says nothing, and neither does its cost's slope.
       const double inside = std::max(0.0, 1 - r * r / c2);
       const double weight = inside * inside;
@@ -63,7 +64,7 @@ void fill(const AlignmentProblem& problem, double scale, const NormalEquations& 
       scale * normal.b + result->information * result->T_map_body.minus(problem.T_map_body_predicted);
   result->seen = normal.seen;
   result->matched = normal.matched;
-  result->cost = normal.seen > 0 ? normal.cost / normal.seen : 0;
+  result->cost = problem.points.empty() ? 0 : normal.cost / static_cast<double>(problem.points.size());
 }
 
 }  // namespace
@@ -91,13 +92,16 @@ bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const P
   const Pose T_cam_body = problem.T_body_cam.inverse();
   Matrix23d J_pixel;
   const auto pixel = problem.camera.project(T_cam_body * x_body, &J_pixel);
-  if (!pixel || !problem.camera.size().contains(*pixel)) return false;
+  if (!pixel || !problem.camera.size().contains(*pixel)) {
+    // As dear as a point without events: otherwise the cheapest pose is one that looks elsewhere.
+    *residual = 1;
+    if (jacobian != nullptr) jacobian->setZero();
+    return false;
+  }
   const FieldSample field = sample_field(problem.surface, *pixel, problem.now_us, point.decay_us, kernel);
   *residual = 1 - field.value;
   if (jacobian != nullptr) {
-    // Only the slope across the contour carries information; along it lies texture.
-    const double slope = field.gradient.dot(point.normal_px);
-    const Eigen::RowVector3d A = -slope * point.normal_px.transpose() * J_pixel * T_cam_body.rotation();
+    const Eigen::RowVector3d A = -field.gradient.transpose() * J_pixel * T_cam_body.rotation();
     // x_body = R^T (X - p): d/dp = -R^T; d/dphi = [x_body]x.
     jacobian->head<3>() = (-A * R_body_map).transpose();
     jacobian->tail<3>() = (A * so3::hat(x_body)).transpose();

@@ -41,7 +41,6 @@ void describe(ConfigTable& table, RegistrationConfig& config);
 /// A contour point as one update needs it.
 struct AlignmentPoint {
   Eigen::Vector3d position_map;   ///< metres
-  Eigen::Vector2d normal_px;      ///< unit, across the projected contour at the predicted pose
   double decay_us = 0;            ///< time constant of the field at this point
 };
 
@@ -68,7 +67,7 @@ struct AlignmentResult {
 
 /// EV-Pose eq. (1) with the prediction as prior (eq. 5 for the newest state):
 ///   min over d of  sum_i rho(1 - T(pi(T_cam_map p_i))) / s^2 + d^T P^-1 d,
-/// by Gauss-Newton with step control, on the part of the field's gradient across each contour.
+/// rho Tukey's biweight, by Gauss-Newton with step control.
 AlignmentResult align(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool);
 
 /// The same minimum by Ceres: the reference for `align`.
@@ -78,7 +77,7 @@ AlignmentResult align_ceres(const AlignmentProblem& problem, const RegistrationC
 void evaluate_information(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool,
                           AlignmentResult* result);
 
-/// Residual 1 - T of one point and its derivative by the pose perturbation; false outside of the image.
+/// Residual 1 - T of one point and its derivative by the pose perturbation; false, 1 and zero outside of the image.
 bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const Pose& T_map_body,
                     const AlignmentPoint& point, double* residual, Vector6d* jacobian);
 

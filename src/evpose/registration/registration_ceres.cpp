@@ -22,16 +22,12 @@ class PointCost final : public ceres::SizedCostFunction<1, 6> {
     Vector6d J;
     const bool wanted = jacobians != nullptr && jacobians[0] != nullptr;
     double r = 0;
-    const bool inside = evaluate_point(problem_, kernel_, problem_.T_map_body_predicted.plus(d), point_, &r,
-                                       wanted ? &J : nullptr);
-    residuals[0] = inside ? root_scale_ * r : 0;
+    evaluate_point(problem_, kernel_, problem_.T_map_body_predicted.plus(d), point_, &r, wanted ? &J : nullptr);
+    residuals[0] = root_scale_ * r;
     if (wanted) {
       Eigen::Map<Eigen::Matrix<double, 1, 6>> out(jacobians[0]);
-      out.setZero();
-      if (inside) {
-        out.head<3>() = root_scale_ * J.head<3>().transpose();
-        out.tail<3>() = root_scale_ * J.tail<3>().transpose() * so3::right_jacobian(d.tail<3>());
-      }
+      out.head<3>() = root_scale_ * J.head<3>().transpose();
+      out.tail<3>() = root_scale_ * J.tail<3>().transpose() * so3::right_jacobian(d.tail<3>());
     }
     return true;
   }
@@ -68,7 +64,7 @@ AlignmentResult align_ceres(const AlignmentProblem& problem, const RegistrationC
   ceres::Problem::Options own;
   own.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem reference(own);
-  ceres::CauchyLoss loss(config.robust_scale * std::sqrt(scale));
+  ceres::TukeyLoss loss(config.robust_scale * std::sqrt(scale));
   for (const auto& point : problem.points)
     reference.AddResidualBlock(new PointCost(problem, config.kernel, point, scale), &loss, d.data());
   reference.AddResidualBlock(new PriorCost(problem.prior_information), nullptr, d.data());

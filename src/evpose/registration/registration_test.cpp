@@ -19,10 +19,11 @@ class AlignmentLaws : public ::testing::Test {
     camera_ = std::move(make_camera({300, 300, 160, 120, "none", {}, {320, 240}})).value();
     T_body_cam_ = {so3::exp({0.1, -0.2, 0.05}), {0.05, 0.02, -0.01}};
     truth_ = Pose{so3::exp({0.2, 0.1, -0.3}), {0.5, -0.2, 0.3}};
-    for (double s = -1; s <= 1; s += 0.02)
-      for (double a : {-0.7, 0.1, 0.8}) {
-        add_line_point({s, a, 3 + 0.3 * a}, Eigen::Vector3d::UnitX());
-        add_line_point({a, s, 4 - 0.5 * a}, Eigen::Vector3d::UnitY());
+    // Slanted lines at many depths: the rounding of events to pixels averages out along each.
+    for (double s = -1; s <= 1; s += 0.01)
+      for (double a : {-0.75, -0.45, 0.1, 0.4, 0.8}) {
+        add_line_point({s, a + 0.3 * s, 2.5 + 1.2 * a}, {1, 0.3, 0});
+        add_line_point({a - 0.4 * s, s, 3 - 1.5 * a}, {-0.4, 1, 0});
       }
     draw_events();
   }
@@ -30,9 +31,11 @@ class AlignmentLaws : public ::testing::Test {
   void add_line_point(const Eigen::Vector3d& x_cam, const Eigen::Vector3d& tangent_cam) {
     const Pose T_map_cam = truth_ * T_body_cam_;
     Matrix23d J;
-    camera_->project(x_cam, &J);
+    const auto pixel = camera_->project(x_cam, &J);
+    if (!pixel || !camera_->size().contains(*pixel, 6)) return;
     const Eigen::Vector2d along = J * tangent_cam;
-    points_.push_back({T_map_cam * x_cam, Eigen::Vector2d(-along.y(), along.x()).normalized(), 5000});
+    points_.push_back({T_map_cam * x_cam, 5000});
+    normals_.push_back(Eigen::Vector2d(-along.y(), along.x()).normalized());
     cam_.push_back(x_cam);
   }
 
@@ -42,7 +45,7 @@ class AlignmentLaws : public ::testing::Test {
       for (std::size_t i = 0; i < points_.size(); ++i) {
         const Eigen::Vector2d u = *camera_->project(cam_[i]);
         for (double side : {-1.0, 1.0}) {
-          const Eigen::Vector2d at = u + side * ring * points_[i].normal_px;
+          const Eigen::Vector2d at = u + side * ring * normals_[i];
           const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
           if (x < 0 || y < 0 || x >= 320 || y >= 240) continue;
           surface_.insert(x, y, i % 2 == 0 ? Polarity::on : Polarity::off,
@@ -57,7 +60,7 @@ class AlignmentLaws : public ::testing::Test {
 
   static Pose off(const Pose& pose) {
     Vector6d d;
-    d << 0.008, -0.006, 0.01, 0.002, -0.003, 0.002;
+    d << 0.008, -0.006, 0.01, -0.002, 0.003, 0.002;
     return pose.plus(d);
   }
 
@@ -65,7 +68,16 @@ class AlignmentLaws : public ::testing::Test {
   Pose T_body_cam_, truth_;
   std::vector<AlignmentPoint> points_;
   std::vector<Eigen::Vector3d> cam_;
+  std::vector<Eigen::Vector2d> normals_;  ///< across the projected lines
   TimeSurface surface_{320, 240};
+  static RegistrationConfig confident() {
+    RegistrationConfig config;
+    config.correlated_points = 1;
+    config.robust_scale = 2;
+    config.max_iterations = 60;
+    config.converged_px = 1e-6;
+    return config;
+  }
   Matrix6d loose_ = 1e-2 * Matrix6d::Identity();
 };
 
@@ -77,18 +89,13 @@ TEST_F(AlignmentLaws, JacobianMatchesDifferences) {
     double r = 0;
     Vector6d J;
     if (!evaluate_point(p, FieldKernel::spline, at, point, &r, &J)) continue;
-    // The law is stated across the contour: move the point only there, by differencing the field along the normal.
     for (int k = 0; k < 6; ++k) {
       const double h = 1e-6;
-      const auto pixel = [&](double s) {
-        return *camera_->project((at.plus(s * Vector6d::Unit(k)) * T_body_cam_).inverse() * point.position_map);
-      };
-      const Eigen::Vector2d motion = (pixel(h) - pixel(-h)) / (2 * h);
-      const auto field = [&](double s) {
-        return sample_field(surface_, pixel(0) + s * point.normal_px, kNow, point.decay_us, FieldKernel::spline).value;
-      };
-      const double slope = (field(1e-5) - field(-1e-5)) / 2e-5;
-      EXPECT_NEAR(J(k), -slope * point.normal_px.dot(motion), 1e-5 * (1 + std::abs(J(k))));
+      double ahead = 0, behind = 0;
+      const Vector6d d = h * Vector6d::Unit(k);
+      evaluate_point(p, FieldKernel::spline, at.plus(d), point, &ahead, nullptr);
+      evaluate_point(p, FieldKernel::spline, at.plus(-d), point, &behind, nullptr);
+      EXPECT_NEAR(J(k), (ahead - behind) / (2 * h), 1e-3 * (1 + std::abs(J(k))));
     }
     ++compared;
   }
@@ -97,22 +104,25 @@ TEST_F(AlignmentLaws, JacobianMatchesDifferences) {
 
 TEST_F(AlignmentLaws, FindsThePoseTheEventsWereDrawnFrom) {
   ThreadPool pool(1);
-  RegistrationConfig config;
-  config.max_iterations = 30;
-  const AlignmentResult r = align(problem(off(truth_), loose_), config, pool);
-  const Vector6d e = r.T_map_body.minus(truth_);
-  EXPECT_LT(e.head<3>().norm(), 2.5e-3);  // events are rounded to whole pixels: 3 m / 300 px
-  EXPECT_LT(e.tail<3>().norm(), 1e-3);
+  const AlignmentResult r = align(problem(off(truth_), loose_), confident(), pool);
+  // Events sit on whole pixels, so the poses may differ where the points' images hardly do.
+  const auto mean_offset_px = [&](const Pose& pose) {
+    double sum = 0;
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      sum += std::abs(normals_[i].dot(
+          *camera_->project((pose * T_body_cam_).inverse() * points_[i].position_map) - *camera_->project(cam_[i])));
+    return sum / static_cast<double>(points_.size());
+  };
+  EXPECT_GT(mean_offset_px(off(truth_)), 0.8);
+  EXPECT_LT(mean_offset_px(r.T_map_body), 0.15);
   EXPECT_GT(r.matched, 0.9 * r.seen);
 }
 
 TEST_F(AlignmentLaws, BothSolversFindTheSameMinimum) {
   ThreadPool pool(1);
-  RegistrationConfig config;
-  config.max_iterations = 60;
-  config.converged_px = 1e-5;
-  const AlignmentProblem p = problem(off(truth_), loose_);
-  const AlignmentResult ours = align(p, config, pool), reference = align_ceres(p, config);
+  const Pose predicted = off(truth_);
+  const AlignmentProblem p = problem(predicted, loose_);
+  const AlignmentResult ours = align(p, confident(), pool), reference = align_ceres(p, confident());
   const Vector6d d = ours.T_map_body.minus(reference.T_map_body);
   EXPECT_LT(d.head<3>().norm(), 1e-4);
   EXPECT_LT(d.tail<3>().norm(), 3e-5);
@@ -121,7 +131,8 @@ TEST_F(AlignmentLaws, BothSolversFindTheSameMinimum) {
 
 TEST_F(AlignmentLaws, AnyNumberOfThreadsGivesTheSameBits) {
   ThreadPool one(1), three(3);
-  const AlignmentProblem p = problem(off(truth_), loose_);
+  const Pose predicted = off(truth_);
+  const AlignmentProblem p = problem(predicted, loose_);
   const AlignmentResult a = align(p, {}, one), b = align(p, {}, three);
   EXPECT_EQ(a.T_map_body.p, b.T_map_body.p);
   EXPECT_EQ(a.T_map_body.q.coeffs(), b.T_map_body.q.coeffs());
@@ -143,11 +154,8 @@ TEST_F(AlignmentLaws, AStrongPriorHoldsThePredictionAndNoEventsChangeNothing) {
 
 TEST_F(AlignmentLaws, InformationAndVectorPointFromThePredictionToTheMinimum) {
   ThreadPool pool(1);
-  RegistrationConfig config;
-  config.max_iterations = 50;
-  config.converged_px = 1e-6;
   const Pose predicted = off(truth_);
-  const AlignmentResult r = align(problem(predicted, loose_), config, pool);
+  const AlignmentResult r = align(problem(predicted, loose_), confident(), pool);
   // At the joint minimum the gradient vanishes: information d - vector + prior d = 0.
   const Vector6d d = r.T_map_body.minus(predicted);
   const Vector6d gradient = r.information * d - r.vector + loose_ * d;

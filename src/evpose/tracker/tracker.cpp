@@ -188,7 +188,7 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
       const RegistrationConfig& c = config_.exponential;
       const double decay_s = std::clamp(c.decay_px / std::max(std::abs(speed), 1e-9), c.decay_min_s,
                                         std::max(c.decay_min_s, c.decay_max_s));
-      points_.push_back({position, normal, 1e6 * decay_s});
+      points_.push_back({position, 1e6 * decay_s});
     }
     flows.push_back((*half_ago - *pixel).norm() / h);
     depths.push_back(x_cam.norm());

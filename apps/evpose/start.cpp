@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "start.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "evpose/io/trajectory_tum.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kUnknownSpeed_m_s = 0.5;      // of a start pose given without velocity
+constexpr double kUnknownRate_rad_s = 0.5;
+constexpr TimeNs kDifference = 5 * kNsPerMs;   // velocity from poses at least so far to both sides
+
+/// First pose of the trajectory inside the recording, velocities from its neighbours.
+Expected<StartState> from_trajectory(const std::vector<TimedPose>& poses, const Recording& recording,
+                                     const std::string& where) {
+  const auto before = [](const TimedPose& p, TimeNs t) { return p.t < t; };
+  const auto first = std::lower_bound(poses.begin(), poses.end(), recording.first_ns, before);
+  if (first == poses.end() || first->t > recording.last_ns)
+    return Error{where, "no pose inside the recording's events", "check the clocks (time.offset_groundtruth_s), or give a pose with --init"};
+  auto a = first, b = first;
+  while (a != poses.begin() && first->t - a->t < kDifference) --a;
+  while (b + 1 != poses.end() && b->t - first->t < kDifference) ++b;
+  if (a == b) return Error{where, "a single pose has no velocity", "give --init x,y,z,qx,qy,qz,qw@t_s"};
+  const double dt = to_seconds(b->t - a->t);
+  StartState start;
+  start.t = first->t;
+  start.T_map_body = first->pose;
+  start.velocity = (b->pose.p - a->pose.p) / dt;
+  start.angular_rate_body = so3::log(a->pose.q.conjugate() * b->pose.q) / dt;
+  return start;
+}
+
+bool parse(const char*& at, const char* end, double* value) {
+  const auto r = std::from_chars(at, end, *value);
+  if (r.ec != std::errc() || !std::isfinite(*value)) return false;
+  at = r.ptr;
+  return true;
+}
+
+Expected<StartState> from_text(const std::string& text_in, const Recording& recording) {
+  const Error wrong{"--init", "'" + text_in + "' is no start pose",
+                    "give groundtruth, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s] with a unit quaternion"};
+  const char* at = text_in.data();
+  const char* const end = at + text_in.size();
+  double v[7];
+  for (int i = 0; i < 7; ++i) {
+    if (i > 0 && (at == end || *at++ != ',')) return wrong;
+    if (!parse(at, end, &v[i])) return wrong;
+  }
+  StartState start;
+  start.t = recording.first_ns;
+  if (at != end) {
+    double t_s = 0;
+    if (*at++ != '@' || !parse(at, end, &t_s) || at != end || std::abs(t_s) > 9e9) return wrong;
+    start.t = from_seconds(t_s);
+  }
+  Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
+  if (std::abs(q.norm() - 1) > 1e-2) return wrong;
+  start.T_map_body = {q.normalized(), {v[0], v[1], v[2]}};
+  return start;
+}
+
+void widen(const Recording& recording, EkfConfig* config) {
+  if (recording.initial_pose) {
+    config->start_position_sigma_m = std::max(config->start_position_sigma_m, recording.initial_pose->sigma_p_m);
+    config->start_rotation_sigma_rad =
+        std::max(config->start_rotation_sigma_rad, recording.initial_pose->sigma_q_deg * M_PI / 180);
+  }
+  config->start_velocity_sigma_m_s = std::max(config->start_velocity_sigma_m_s, kUnknownSpeed_m_s);
+  config->start_angular_rate_sigma_rad_s = std::max(config->start_angular_rate_sigma_rad_s, kUnknownRate_rad_s);
+}
+
+}  // namespace
+
+Expected<StartState> choose_start(const std::string& init, const Recording& recording,
+                                  const std::vector<TimedPose>& truth, EkfConfig* config) {
+  if (init == "groundtruth" || (init == "auto" && !truth.empty())) {
+    if (truth.empty())
+      return Error{"--init groundtruth", "the recording has no ground truth", "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
+    return from_trajectory(truth, recording, recording.groundtruth_path);
+  }
+  if (init == "auto") {
+    if (!recording.initial_pose)
+      return Error{"--init", "the recording has neither ground truth nor initial_pose", "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
+    widen(recording, config);
+    StartState start;
+    start.t = std::max(recording.initial_pose->t, recording.first_ns);
+    start.T_map_body = recording.initial_pose->T_map_body;
+    return start;
+  }
+  if (init.find(',') == std::string::npos) {
+    const auto poses = read_tum(init);
+    if (!poses) return Error{"--init", poses.error().line(), "give groundtruth, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
+    return from_trajectory(*poses, recording, init);
+  }
+  auto start = from_text(init, recording);
+  if (!start) return start;
+  if (start->t > recording.last_ns)
+    return Error{"--init", "the start lies after the recording's end", "give a time on the recording's clock after @"};
+  widen(recording, config);
+  return start;
+}
+
+}  // namespace evpose

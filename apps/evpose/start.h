@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evpose/core/error.h"
+#include "evpose/io/recording.h"
+#include "evpose/tracker/tracker.h"
+
+namespace evpose {
+
+/// Where a run starts, from the words of --init:
+///   auto         ground truth if the recording has it, else its initial_pose
+///   groundtruth  the first ground-truth pose inside the events, with its velocity
+///   x,y,z,qx,qy,qz,qw[@t_s]   T_map_body at a time of the recording's clock, at rest or moving slowly
+///   FILE         a TUM trajectory of T_map_body, used like ground truth
+/// A pose without velocity widens the start's uncertainty in `config`.
+Expected<StartState> choose_start(const std::string& init, const Recording& recording,
+                                  const std::vector<TimedPose>& truth, EkfConfig* config);
+
+}  // namespace evpose

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "track_recording.h"
+
+#include <sys/resource.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+#include "evpose/io/config_yaml.h"
+#include "evpose/io/contour_files.h"
+#include "evpose/io/imu_units.h"
+#include "evpose/io/ply.h"
+#include "evpose/io/recording.h"
+#include "evpose/report/overlay.h"
+#include "packet_queue.h"
+#include "progress.h"
+#include "start.h"
+
+namespace evpose {
+namespace {
+
+constexpr std::size_t kUnitCheckSamples = 20'000;  // of the IMU, looked at before the run
+constexpr std::size_t kDrawnMapPoints = 20'000;    // handed to the report
+constexpr double kOverlayDecay_s = 0.02;
+
+double wall_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double cpu_s() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request, const Recording& recording) {
+  std::string path = request.map;
+  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
+  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
+  auto map = read_contour_map(path);
+  if (!map) return map.error();
+  if (!request.occluders.empty()) {
+    auto mesh = read_ply_mesh(request.occluders, map->anchor);
+    if (!mesh) return mesh.error();
+    map->occluders = std::move(*mesh);
+  }
+  return std::make_shared<const ContourMap>(std::move(*map));
+}
+
+/// Looks at the first seconds of the IMU before anything is made of them.
+Status check_units(const Recording& recording, const std::vector<TimedPose>& truth) {
+  auto imu = open_imu(recording);
+  if (!imu) return imu.error();
+  std::vector<ImuSample> samples;
+  ImuSample sample;
+  while (samples.size() < kUnitCheckSamples) {
+    const auto more = imu->next(sample);
+    if (!more) return more.error();
+    if (!*more) break;
+    samples.push_back(sample);
+  }
+  if (auto ok = check_imu_units(samples, recording.imu_path); !ok) return ok;
+  return check_gyro_against(truth, samples, recording.imu_path);
+}
+
+/// Reads both streams side by side; the IMU runs ahead so that no event has to wait for it.
+Status feed(const Recording& recording, const RunConfig& config, Tracker& tracker, Progress& progress) {
+  auto reader = open_events(recording, 1e-3 * config.packet_ms);
+  if (!reader) return reader.error();
+  std::unique_ptr<ImuReader> imu;
+  if (recording.has_imu) {
+    auto opened = open_imu(recording);
+    if (!opened) return opened.error();
+    imu = std::make_unique<ImuReader>(std::move(*opened));
+  }
+  std::unique_ptr<PacketQueue> ahead;
+  if (config.tracker.threads > 1) ahead = std::make_unique<PacketQueue>(**reader);
+  EventPacket packet;
+  ImuSample sample;
+  TimeNs imu_until = std::numeric_limits<TimeNs>::min();
+  while (true) {
+    const auto more = ahead ? ahead->next(packet) : (*reader)->next(packet);
+    if (!more) return more.error();
+    if (!*more) return {};
+    const TimeNs end = packet.time(packet.events.back());
+    while (imu && imu_until <= end) {
+      const auto another = imu->next(sample);
+      if (!another) return another.error();
+      if (!*another) break;
+      tracker.add_imu(sample);
+      imu_until = sample.t;
+    }
+    tracker.add_events(packet);
+    progress.at(to_seconds(end - recording.first_ns) / std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns)));
+  }
+}
+
+RunSummary summarise(const Recording& recording, const TrackRequest& request, const ContourMap& map,
+                     const Tracker& tracker, std::vector<TimedPose> truth, const Pose& T_body_cam) {
+  RunSummary summary;
+  summary.title = recording.name;
+  const auto name = [](const std::string& path) { return path.substr(path.find_last_of('/') + 1); };
+  summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",
+                          map.occluders.triangles.empty() ? "" : ", with occluders", "), start: ", request.init,
+                          recording.has_imu ? "" : ", no IMU");
+  summary.T_body_cam = T_body_cam;
+  summary.truth = std::move(truth);
+  const std::size_t step = map.points.size() / kDrawnMapPoints + 1;
+  for (std::size_t i = 0; i < map.points.size(); i += step) summary.map_points.push_back(map.position(i));
+  const auto& counts = tracker.events().counts();
+  summary.events_read = static_cast<std::uint64_t>(counts.read);
+  summary.events_kept = static_cast<std::uint64_t>(counts.kept);
+  for (const auto& p : tracker.events().filter().hot_pixels()) summary.hot_pixels.emplace_back(p.x, p.y);
+  summary.versions = {{"compiler", __VERSION__},
+                      {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};
+  return summary;
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, RunConfig& c) {
+  describe(table, c.tracker);
+  table.add("packet_ms", c.packet_ms, "ms", "length of the packets in which events are read", {1e-3, 1e5});
+  table.add("overlays", c.overlays, "", "pictures of the map over the time surface in the report", {0, 100});
+}
+
+Expected<RunConfig> load_config(const TrackRequest& request) {
+  RunConfig config;
+  ConfigTable table;
+  describe(table, config);
+  if (!request.config_file.empty())
+    if (auto ok = apply_yaml(table, request.config_file); !ok) return ok.error();
+  for (const auto& assignment : request.assignments)
+    if (auto ok = apply_assignment(table, assignment); !ok) return ok.error();
+  return config;
+}
+
+Expected<RunOutcome> track_recording(const TrackRequest& request) {
+  auto config = load_config(request);
+  if (!config) return config.error();
+  const auto recording = open_recording(request.recording);
+  if (!recording) return recording.error();
+  auto map = load_map(request, *recording);
+  if (!map) return map.error();
+  auto camera = make_camera(recording->camera);
+  if (!camera) return Error{recording->calibration_path, camera.error().what, camera.error().fix};
+  std::vector<TimedPose> truth;
+  if (!recording->groundtruth_path.empty()) {
+    auto read = read_groundtruth(*recording);
+    if (!read) return read.error();
+    truth = std::move(*read);
+  }
+  if (recording->has_imu)
+    if (auto ok = check_units(*recording, truth); !ok) return ok.error();
+  const auto start = choose_start(request.init, *recording, truth, &config->tracker.ekf);
+  if (!start) return start.error();
+  auto run = RunFolder::create(request.output);
+  if (!run) return run.error();
+
+  const TrackerSetup setup{*camera, recording->T_cam_body.inverse(),
+                           recording->has_imu ? MotionModel::imu : MotionModel::constant_velocity,
+                           recording->imu_noise, *map};
+  auto tracker = Tracker::create(setup, config->tracker, *start, wall_s);
+  if (!tracker) return tracker.error();
+  int most_points = 0;
+  std::int64_t updates = 0;
+  TimeNs next_overlay = start->t;
+  const TimeNs overlay_step = (recording->last_ns - start->t) / (config->overlays + 1);
+  (*tracker)->on_update([&](const Update& u) {
+    run->add(u);
+    ++updates;
+    most_points = std::max(most_points, u.points);
+    if (updates == 1) next_overlay = start->t + overlay_step;
+    if (u.t < next_overlay || config->overlays == 0) return;
+    next_overlay += overlay_step;
+    const Tracker::Snapshot s = (*tracker)->snapshot(kOverlayDecay_s);
+    std::vector<OverlayPoint> points;
+    for (const auto& p : s.points) points.push_back({p.x, p.y, p.matched});
+    run->add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start->t)), " s"),
+                     draw_overlay(s.size.width, s.size.height, s.decay, points));
+  });
+
+  const double wall_start = wall_s(), cpu_start = cpu_s();
+  Progress progress("tracking");
+  if (auto ok = feed(*recording, *config, **tracker, progress); !ok) return ok.error();
+  progress.done();
+  if (updates == 0)
+    return Error{request.recording, "the streams end before the first update", "check that events and IMU cover the start"};
+  if (most_points == 0)
+    return Error{(*map)->source, text("none of the map's ", (*map)->points.size(), " points ever comes into view"),
+                 "check the map's frame, the start pose and the extrinsics T_cam_imu"};
+
+  RunSummary summary = summarise(*recording, request, **map, **tracker, std::move(truth), setup.T_body_cam);
+  summary.wall_s = wall_s() - wall_start;
+  summary.cpu_s = cpu_s() - cpu_start;
+  summary.peak_memory_mb = peak_memory_mb();
+  ConfigTable table;
+  describe(table, *config);
+  return run->finish(summary, table);
+}
+
+}  // namespace evpose

@@ -83,18 +83,21 @@ void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, 
 bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
   const auto z = static_cast<float>(point_cam.z());
   const Eigen::Vector3f ray = (point_cam / point_cam.z()).cast<float>();
-  const int column = static_cast<int>(std::lround((ray.x() + tangents_.x()) / cell_ - 0.5F));
-  const int row = static_cast<int>(std::lround((ray.y() + tangents_.y()) / cell_ - 0.5F));
+  const float x = (ray.x() + tangents_.x()) / cell_ - 0.5F, y = (ray.y() + tangents_.y()) / cell_ - 0.5F;
+  const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
   const auto cell = [&](int c, int r) -> const Cell* {
     if (c < 0 || r < 0 || c >= columns_ || r >= rows_) return nullptr;
     return &cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
   };
-  if (const Cell* own = cell(column, row); own != nullptr && own->inverse_depth > 0) {
-    if (own->slope.dot(ray) * (z - kSlack_m - kSlackShare * z) > 1) return true;
-  }
-  for (int r = row - 1; r <= row + 1; ++r)
-    for (int c = column - 1; c <= column + 1; ++c)
-      if (const Cell* near = cell(c, r); near != nullptr && near->inverse_depth * (z - kSilhouetteShare * z) > 1) return true;
+  // The four cells around the point are asked at the point itself, those further out for silhouettes.
+  for (int r = row - 1; r <= row + 2; ++r)
+    for (int c = column - 1; c <= column + 2; ++c) {
+      const Cell* const near = cell(c, r);
+      if (near == nullptr || !(near->inverse_depth > 0)) continue;
+      const bool around = r >= row && r <= row + 1 && c >= column && c <= column + 1;
+      if (around && near->slope.dot(ray) * (z - kSlack_m - kSlackShare * z) > 1) return true;
+      if (near->inverse_depth * (z - kSilhouetteShare * z) > 1) return true;
+    }
   return false;
 }
 

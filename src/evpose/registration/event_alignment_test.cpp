@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/event_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace evpose {
+namespace {
+
+constexpr std::uint32_t kNow = 500'000;
+constexpr double kSpan_s = 0.004;
+constexpr double kFocal = 300;  // px per metre of the toy camera: a shift of the body shifts the image
+
+/// Straight contours in a 320 x 240 image; the pose's first two parameters shift the image, the others do nothing.
+class EventAlignmentLaws : public ::testing::Test {
+ protected:
+  EventAlignmentLaws() {
+    config_.lateness_px = 0;
+    config_.start_caution = 0;
+    config_.map_sigma_m = 0;
+    covariance_.setZero();
+  }
+
+  /// Samples each 4 px along a line through `at` across `normal`, which moves at `speed` px/s.
+  void add_line(const Eigen::Vector2d& at, const Eigen::Vector2d& normal, double speed, int count = 20) {
+    const Eigen::Vector2d n = normal.normalized(), t(-n.y(), n.x());
+    for (int k = 0; k < count; ++k) {
+      ContourSample s{at + 4.0 * k * t, n, speed, 0, Vector6d::Zero(), 0};
+      s.jacobian.head<2>() = -kFocal * n;  // dd/dp: the contour moves along +n, the distance shrinks
+      samples_.push_back(s);
+    }
+  }
+
+  /// One event a pixel along each line at a random age, `offset` px along the normal from the contour of then.
+  void draw_events(double offset, unsigned seed = 1) {
+    std::mt19937 random(seed);
+    for (const auto& s : samples_) {
+      const Eigen::Vector2d t(-s.normal_px.y(), s.normal_px.x());
+      for (int j = -2; j < 2; ++j) {
+        const double age = kSpan_s * static_cast<double>(random() % 1000) / 1000;
+        const Eigen::Vector2d x = s.pixel + j * t + (offset - s.speed_px_s * age) * s.normal_px;
+        add_event(x, age);
+      }
+    }
+  }
+  void add_event(const Eigen::Vector2d& x, double age_s) {
+    FrontEvent e{};
+    e.stamp_us = kNow - static_cast<std::uint32_t>(std::lround(age_s * 1e6));
+    e.x = static_cast<std::uint16_t>(std::lround(x.x()));
+    e.y = static_cast<std::uint16_t>(std::lround(x.y()) & 0x7FFF);
+    events_.push_back(e);
+  }
+
+  EventAlignmentResult align() {
+    EventAlignment alignment({320, 240}, config_);
+    return alignment.align({events_, kNow, kSpan_s, 100.0, samples_, covariance_});
+  }
+
+  EventAlignmentConfig config_;
+  std::vector<ContourSample> samples_;
+  std::vector<FrontEvent> events_;
+  Matrix6d covariance_;
+};
+
+double solved(const EventAlignmentResult& r, int i) { return r.vector(i) / r.information(i, i); }
+
+TEST_F(EventAlignmentLaws, AShiftOfTheContoursIsFoundInEachDirection) {
+  // Lines along the pixel grid put every event exactly where it belongs.
+  add_line({100, 40}, {1, 0}, 0);
+  add_line({40, 200}, {0, -1}, 0);
+  for (auto& s : samples_) s.pixel -= 0.2 * Eigen::Vector2d(1, 1);  // the prediction is off by so much
+  draw_events(0);
+  for (auto& e : events_) EXPECT_TRUE(e.x > 0);
+  const EventAlignmentResult r = align();
+  EXPECT_EQ(r.matched_samples, 40);
+  // The contours have to move by +0.2 px along x and along y.
+  EXPECT_NEAR(solved(r, 0) * kFocal, 0.2, 0.04);
+  EXPECT_NEAR(solved(r, 1) * kFocal, 0.2, 0.04);
+}
+
+TEST_F(EventAlignmentLaws, EventsOfAnyAgeMeetTheContourWhereItWasThen) {
+  add_line({150, 40}, {1, 0}, 500);  // 2 px in the span
+  for (double age : {0.0, 0.002, 0.004}) add_event({150 - 500 * age, 60}, age);
+  const EventAlignmentResult r = align();
+  EXPECT_EQ(r.matched_events, 3);
+  EXPECT_LT(r.mean_square_px2, 1e-9);
+}
+
+TEST_F(EventAlignmentLaws, AccelerationOfTheContourCounts) {
+  add_line({150, 40}, {1, 0}, 500);
+  for (auto& s : samples_) s.curvature_px_s2 = 62'500;  // 1 px at 4 ms
+  add_event({149, 60}, 0.004);  // 150 - 2 + 1
+  const EventAlignmentResult r = align();
+  EXPECT_EQ(r.matched_events, 1);
+  EXPECT_LT(r.mean_square_px2, 1e-9);
+}
+
+TEST_F(EventAlignmentLaws, LatenessIsTakenOffInTheDirectionOfMotion) {
+  config_.lateness_px = 0.25;
+  for (double speed : {400.0, -400.0}) {
+    samples_.clear();
+    events_.clear();
+    add_line({150.25 * (speed > 0 ? 1 : 0) + 149.75 * (speed > 0 ? 0 : 1), 40}, {1, 0}, speed);
+    add_event({150, 60}, 0);  // a quarter pixel behind the contour
+    EXPECT_LT(align().mean_square_px2, 1e-9) << speed;
+  }
+}
+
+TEST_F(EventAlignmentLaws, GateOpensWithThePredictionsUncertainty) {
+  add_line({150, 40}, {1, 0}, 0);
+  add_event({152, 60}, 0);
+  EXPECT_EQ(align().matched_events, 0);
+  covariance_(0, 0) = std::pow(1.0 / kFocal, 2);  // 1 px
+  EXPECT_EQ(align().matched_events, 1);
+}
+
+TEST_F(EventAlignmentLaws, EventsBetweenTwoContoursAreLeftOut) {
+  config_.gate_px = 2;
+  add_line({150, 40}, {1, 0}, 0);
+  add_event({151, 60}, 0);
+  EXPECT_EQ(align().matched_events, 1);
+  add_line({152, 40}, {1, 0}, 0);
+  EXPECT_EQ(align().matched_events, 0);
+}
+
+TEST_F(EventAlignmentLaws, UniformClutterPullsNowhere) {
+  config_.gate_px = 3;
+  add_line({150.3, 20}, {1, 0}, 0, 50);
+  std::mt19937 random(4);
+  for (int i = 0; i < 200'000; ++i)
+    add_event({140.0 + static_cast<double>(random() % 21), 20.0 + static_cast<double>(random() % 200)}, 0);
+  EXPECT_NEAR(solved(align(), 0) * kFocal, 0, 0.05);
+}
+
+TEST_F(EventAlignmentLaws, InformationOfOneClusterIsBounded) {
+  add_line({150, 33}, {1, 0}, 0, 4);
+  std::vector<double> information;
+  for (int n : {1, 10, 100, 10'000}) {
+    events_.clear();
+    for (int i = 0; i < n; ++i) add_event({150, 33.0 + i % 12}, 0);
+    information.push_back(align().information(0, 0));
+  }
+  EXPECT_GT(information[1], information[0]);
+  const double repeats = config_.shared_s / kSpan_s;
+  const double bound = kFocal * kFocal / (repeats * config_.shared_sigma_px * config_.shared_sigma_px);
+  EXPECT_LT(information[3], bound);
+  EXPECT_GT(information[3], 0.9 * bound * 0.99);
+}
+
+TEST_F(EventAlignmentLaws, NothingInNothingOut) {
+  EXPECT_EQ(align().information, Matrix6d::Zero());
+  add_line({150, 40}, {1, 0}, 0);
+  EXPECT_EQ(align().information, Matrix6d::Zero());
+  samples_.clear();
+  add_event({150, 60}, 0);
+  EXPECT_EQ(align().matched_events, 0);
+}
+
+TEST_F(EventAlignmentLaws, StripsAreReleasedAfterEachCall) {
+  EventAlignment alignment({320, 240}, config_);
+  add_line({150, 40}, {1, 0}, 0);
+  add_event({150, 60}, 0);
+  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, 100.0, samples_, covariance_}).matched_events, 1);
+  const std::vector<ContourSample> none;
+  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, 100.0, none, covariance_}).matched_events, 0);
+}
+
+}  // namespace
+}  // namespace evpose

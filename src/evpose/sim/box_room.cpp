@@ -86,17 +86,17 @@ void add_table(RoomBuilder& room) {
   for (const double x : {-0.6, 0.6}) {
     for (const double y : {-0.32, 0.32}) {
       room.stand(middle + turn * Eigen::Vector3d(x, y, 0), {0.07, 0.07, 0.7}, yaw_deg,
-                 covered_in_planks(0.16, 0.03));
+                 covered_in_planks(0.1, 0.03));
     }
   }
-  room.stand(middle + Eigen::Vector3d(0, 0, 0.7), {1.4, 0.8, 0.05}, yaw_deg, covered_in_planks(0.55, 0.11));
-  room.stand(middle + Eigen::Vector3d(0.3, 0.05, 0.75), {0.36, 0.28, 0.22}, 41, covered_in_cartons(0.25));
-  room.stand(middle + Eigen::Vector3d(-0.35, -0.1, 0.75), {0.3, 0.24, 0.3}, -8, covered_in_cloth(0.2));
+  room.stand(middle + Eigen::Vector3d(0, 0, 0.7), {1.4, 0.8, 0.05}, yaw_deg, covered_in_planks(0.7, 0.11));
+  room.stand(middle + Eigen::Vector3d(0.3, 0.05, 0.75), {0.36, 0.28, 0.22}, 41, covered_in_cartons(0.16));
+  room.stand(middle + Eigen::Vector3d(-0.35, -0.1, 0.75), {0.3, 0.24, 0.3}, -8, covered_in_cloth(0.15));
 }
 
 void add_shelf(RoomBuilder& room) {
   constexpr double kX = 5.82, kDepth = 0.36, kLeft = 0.7, kRight = 2.1, kBoard = 0.04, kHeight = 2.0;
-  const Cover wood = covered_in_planks(0.62, 0.09);
+  const Cover wood = covered_in_planks(0.75, 0.09);
   for (const double y : {kLeft, kRight}) room.stand({kX, y, 0}, {kDepth, kBoard, kHeight}, 0, wood);
   const double inner = kRight - kLeft - kBoard, middle = 0.5 * (kLeft + kRight);
   for (const double z : {0.1, 0.58, 1.06, 1.54})
@@ -108,11 +108,11 @@ void add_shelf(RoomBuilder& room) {
 }
 
 void add_crates(RoomBuilder& room) {
-  room.stand({4.6, 1.15, 0}, {0.75, 0.6, 0.55}, 28, covered_in_cartons(0.6));
-  room.stand({4.62, 1.18, 0.55}, {0.46, 0.36, 0.4}, 52, covered_in_cartons(0.2));
-  room.stand({3.5, 0.75, 0}, {0.55, 0.5, 0.45}, -20, covered_in_planks(0.13, 0.1));
-  room.stand({5.0, 4.2, 0}, {0.8, 0.7, 0.8}, 12, covered_in_planks(0.6, 0.12));
-  room.stand({5.02, 4.18, 0.8}, {0.55, 0.45, 0.45}, -15, covered_in_cartons(0.22));
+  room.stand({4.6, 1.15, 0}, {0.75, 0.6, 0.55}, 28, covered_in_cartons(0.72));
+  room.stand({4.62, 1.18, 0.55}, {0.46, 0.36, 0.4}, 52, covered_in_cartons(0.13));
+  room.stand({3.5, 0.75, 0}, {0.55, 0.5, 0.45}, -20, covered_in_planks(0.1, 0.1));
+  room.stand({5.0, 4.2, 0}, {0.8, 0.7, 0.8}, 12, covered_in_planks(0.7, 0.12));
+  room.stand({5.02, 4.18, 0.8}, {0.55, 0.45, 0.45}, -15, covered_in_cartons(0.13));
   room.stand({0.6, 1.2, 0}, {0.7, 0.8, 0.6}, -33, covered_in_cartons(0.4));
 }
 
@@ -124,8 +124,8 @@ Scene make_box_room(std::uint64_t seed) {
   add_table(room);
   add_shelf(room);
   add_crates(room);
-  room.stand({4.35, 2.3, 0}, {0.32, 0.32, 3}, 0, covered_in_bricks(0.2));          // pillar
-  room.stand({3.2, 4.72, 0}, {1.1, 0.56, 1.9}, 0, covered_in_planks(0.15, 0.18));  // cupboard at the wall
+  room.stand({4.35, 2.3, 0}, {0.32, 0.32, 3}, 0, covered_in_bricks(0.11));         // pillar
+  room.stand({3.2, 4.72, 0}, {1.1, 0.56, 1.9}, 0, covered_in_planks(0.12, 0.18));  // cupboard at the wall
   room.stand({5.91, 3.05, 0.9}, {0.18, 0.9, 0.7}, 0, covered_in_cloth(0.45));      // box on the far wall
   room.stand({3.0, 2.5, 2.78}, {0.24, 5, 0.22}, 0, covered_in_planks(0.42, 0.2));  // beam under the ceiling
   room.stand({0.2, 3.6, 0}, {0.4, 1.5, 0.5}, 0, covered_in_cloth(0.35));           // bench at the near wall

@@ -74,8 +74,8 @@ Pattern bricks(double mean, std::uint64_t seed) {
     const Cell row = cell(v, 0.075);
     const Cell brick = cell(u + (row.index & 1 ? 0.12 : 0.0), 0.24);
     if (row.offset_m < 0.011 || brick.offset_m < 0.011)
-      return 1.5 * mean + 0.03 * noise(u / 0.01, v / 0.01, seed);
-    const double tone = 0.65 + 0.6 * cell_value(brick.index, row.index, seed);
+      return 1.35 * mean + 0.03 * noise(u / 0.01, v / 0.01, seed);
+    const double tone = 0.78 + 0.4 * cell_value(brick.index, row.index, seed);
     return mean *
            (tone + 0.12 * noise(u / 0.012, v / 0.012, seed + 1) + 0.1 * noise(u / 0.05, v / 0.03, seed + 2));
   };
@@ -109,7 +109,7 @@ Pattern plaster(double mean, std::uint64_t seed) {
   return [=](double u, double v) {
     const double stain = noise(u / 0.35, v / 0.35, seed) + 0.5 * noise(u / 0.11, v / 0.11, seed + 1);
     const double speckle =
-        cell_value(cell(u, 0.014).index, cell(v, 0.014).index, seed + 2) > 0.985 ? -0.35 : 0.0;
+        cell_value(cell(u, 0.014).index, cell(v, 0.014).index, seed + 2) > 0.985 ? -0.3 : 0.0;
     return mean * (1 + 0.1 * stain + 0.05 * noise(u / 0.02, v / 0.02, seed + 3) + speckle);
   };
 }

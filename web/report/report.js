@@ -67,6 +67,9 @@ function faint(name, opacity) {
   return `rgba(${c >> 16}, ${(c >> 8) & 255}, ${c & 255}, ${opacity})`;
 }
 
+/** Without a mouse, dragging scrolls the page and the buttons that come on hovering would stay. */
+const touch = !window.matchMedia("(hover: hover)").matches;
+
 const axis = (title, more = {}) => ({
   title: { text: title, standoff: 8, font: { size: 12 } },
   gridcolor: colour("grid"),
@@ -80,9 +83,11 @@ function layout(more) {
   return {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: style.fontFamily || "sans-serif", size: 12, color: colour("ink") },
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("ink") },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("estimate") },
+    dragmode: touch ? false : "zoom",
     margin: { l: 52, r: 12, t: 28, b: 42 },
-    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 } },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 }, itemsizing: "constant" },
     hovermode: "x unified",
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
     ...more,
@@ -91,23 +96,43 @@ function layout(more) {
 
 const time = () => axis("time [s]");
 
+/** A line that is broken where there was no pose. */
 function line(name, series, ink, more = {}) {
-  return { type: "scatter", mode: "lines", name, x: series.t, y: series.y, line: { color: colour(ink), width: 1.5 }, ...more };
+  const x = [], y = [];
+  series.t.forEach((t, i) => {
+    if (i > 0 && (run.lost || []).some((l) => l.from >= series.t[i - 1] && l.to <= t)) {
+      x.push(t);
+      y.push(null);
+    }
+    x.push(t);
+    y.push(series.y[i]);
+  });
+  return { type: "scatter", mode: "lines", name, x, y, line: { color: colour(ink), width: 1.5 }, ...more };
 }
+
+/** Marks the stretches without pose. */
+const lostShapes = () => (run.lost || []).map((l) => ({
+  type: "rect", xref: "x", yref: "paper", x0: l.from, x1: l.to, y0: 0, y1: 1, layer: "below",
+  fillcolor: faint("bad", 0.14), line: { width: 0 },
+}));
 
 /** The area from -bound to +bound, or from 0 to it. */
 function band(name, bound, both, ink) {
   const x = both ? bound.t.concat(bound.t.slice().reverse()) : bound.t;
   const y = both ? bound.y.concat(bound.y.map((v) => -v).reverse()) : bound.y;
   return {
-    type: "scatter", mode: "lines", name, x, y, fill: both ? "toself" : "tozeroy", fillcolor: faint(ink, 0.16),
+    type: "scatter", mode: "lines", name, x, y, fill: both ? "toself" : "tozeroy", fillcolor: faint(ink, both ? 0.09 : 0.16),
     line: { width: 0, color: faint(ink, 0.4) }, hoverinfo: "skip",
   };
 }
 
-/** A range that shows the series; a bound that leaves it may run out of the picture. */
-function rangeOf(series, both) {
-  const top = series.reduce((m, s) => s.y.reduce((n, v) => Math.max(n, Math.abs(v)), m), 0) * 1.25 || 1;
+const largest = (series) => series.y.reduce((m, v) => Math.max(m, Math.abs(v)), 0);
+
+/** A range that shows the errors in full, and their bounds unless these would make the errors small. */
+function rangeOf(errors, bounds, both) {
+  const error = Math.max(...errors.map(largest));
+  const bound = Math.max(0, ...bounds.filter(Boolean).map(largest));
+  const top = 1.1 * Math.max(error, Math.min(bound, 2 * error)) || 1;
   return both ? [-top, top] : [0, top];
 }
 
@@ -128,7 +153,7 @@ function trajectory3d() {
     });
   }
   const a = (title) => ({ title: { text: title }, gridcolor: colour("line"), zerolinecolor: colour("line"), color: colour("soft"), showbackground: false });
-  const scene = { aspectmode: "data", xaxis: a("x [m]"), yaxis: a("y [m]"), zaxis: a("z [m]"), camera: { eye: { x: 1.25, y: -1.35, z: 0.9 } } };
+  const scene = { aspectmode: "data", xaxis: a("x [m]"), yaxis: a("y [m]"), zaxis: a("z [m]"), camera: { eye: { x: 1.35, y: -1.55, z: 0.95 }, center: { x: 0, y: 0, z: -0.15 } } };
   return { data, layout: layout({ scene, margin: { l: 0, r: 0, t: 24, b: 0 }, hovermode: "closest" }) };
 }
 
@@ -144,7 +169,7 @@ function topView() {
       customdata: path.t, hovertemplate: "%{x:.3f}, %{y:.3f} m<br>%{customdata:.3f} s",
     });
   }
-  const first = run.paths[0];
+  const first = run.paths[run.paths.length - 1];
   data.push({ type: "scatter", mode: "markers", name: "start", x: [first.x[0]], y: [first.y[0]], marker: { size: 9, symbol: "circle-open", line: { width: 2 }, color: colour("ink") }, hoverinfo: "skip" });
   return { data, layout: layout({ xaxis: axis("x [m]"), yaxis: axis("y [m]", { scaleanchor: "x" }), hovermode: "closest" }) };
 }
@@ -153,7 +178,7 @@ const errorOverTime = (series, bound, unit) => () => {
   const data = [];
   if (bound) data.push(band("3 sigma of the covariance", bound, false, "estimate"));
   data.push(line("error", series, "estimate"));
-  return { data, layout: layout({ xaxis: time(), yaxis: axis(`error [${unit}]`, { range: rangeOf([series], false) }) }) };
+  return { data, layout: layout({ shapes: lostShapes(), xaxis: time(), yaxis: axis(`error [${unit}]`, { range: rangeOf([series], [bound], false) }) }) };
 };
 
 const errorByAxis = (axes, unit) => () => {
@@ -162,7 +187,7 @@ const errorByAxis = (axes, unit) => () => {
     if (a.bound) data.push({ ...band(a.name + ", 3 sigma", a.bound, true, a.ink), legendgroup: a.name, showlegend: false });
     data.push({ ...line(a.name, a.error, a.ink), legendgroup: a.name });
   }
-  return { data, layout: layout({ xaxis: time(), yaxis: axis(`error [${unit}]`, { range: rangeOf(axes.map((a) => a.error), true) }) }) };
+  return { data, layout: layout({ shapes: lostShapes(), xaxis: time(), yaxis: axis(`error [${unit}]`, { range: rangeOf(axes.map((a) => a.error), axes.map((a) => a.bound), true) }) }) };
 };
 
 const distribution = (cdf, unit) => () => ({
@@ -257,11 +282,11 @@ function work(page) {
   if (run.latency) {
     card(row, "latency", "Wall time of an update by stage", "", latency);
     const box = element("section", { cls: "card", parent: row });
-    element("h3", { text: "Wall time of an update by stage [ms]", parent: box });
+    element("h3", { text: "Median, p99 and largest [ms]", parent: box });
     table(box, ["stage", "median", "p99", "largest"], run.latency.table, [1, 2, 3]);
   }
-  card(row, "events", "Events", "background: health", activity([["read", run.activity.read, "estimate"], ["kept by the noise filter", run.activity.kept, "warm"]], "events [million / s]"));
-  card(row, "points", "Map points", "background: health", activity([["chosen", run.activity.points, "truth"], ["matched", run.activity.matched, "estimate"]], "points per update"));
+  card(row, "events", "Events read, and kept by the noise filter", "background: health", activity([["read", run.activity.read, "estimate"], ["kept", run.activity.kept, "warm"]], "events [million / s]"));
+  card(row, "points", "Map points chosen, and matched with events", "background: health", activity([["chosen", run.activity.points, "truth"], ["matched", run.activity.matched, "estimate"]], "points per update"));
   if (run.health.length) {
     const states = element("section", { cls: "card wide", parent: row });
     element("h3", { text: "Changes of health", parent: states });
@@ -296,7 +321,9 @@ function build() {
 async function draw() {
   for (const { div, figure } of plots) {
     const { data, layout: l } = figure();
-    await Plotly.react(div, data, l, { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] });
+    await Plotly.react(div, data, l, {
+      responsive: true, displaylogo: false, displayModeBar: touch ? false : "hover", modeBarButtonsToRemove: ["lasso2d", "select2d"],
+    });
     div.dataset.drawn = "yes";
   }
 }

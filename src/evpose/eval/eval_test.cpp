@@ -235,6 +235,19 @@ TEST(Score, CoverageOfALongSilenceTakesNoTime) {
   EXPECT_EQ(s.pairs, 100u);  // the last two poses are the ends of a gap
 }
 
+TEST(Measures, CoverageCountsWhatReachesIntoTheSpan) {
+  std::vector<ErrorSample> samples(3);
+  samples[0].t = -200 * kNsPerMs;
+  samples[1].t = -15 * kNsPerMs;  // reaches instant 0
+  samples[2].t = 115 * kNsPerMs;  // reaches from 95 on, after the last instant
+  const Coverage c = coverage_of(samples, 0, 100 * kNsPerMs);
+  EXPECT_NEAR(c.share, 0.1, 1e-12);
+  ASSERT_EQ(c.lost.size(), 1u);
+  EXPECT_EQ(c.lost[0].from, 10 * kNsPerMs);
+  EXPECT_EQ(c.lost[0].to, 100 * kNsPerMs);
+  EXPECT_EQ(coverage_of(samples, 5, 5).share, 0);
+}
+
 TEST(Association, LeavesOutGapsAndRepeatedStamps) {
   auto truth = flight_at(100, 0, 2);
   std::erase_if(truth, [](const TimedPose& p) { return p.t > 995 * kNsPerMs && p.t < 1095 * kNsPerMs; });

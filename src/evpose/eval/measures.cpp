@@ -56,6 +56,7 @@ Coverage coverage_of(std::span<const ErrorSample> samples, TimeNs from, TimeNs t
   // From sample to sample, so that the work does not follow the length of the span.
   std::int64_t next = 0;  // first instant not yet judged
   for (const ErrorSample& s : samples) {
+    if (s.t + kReach < from) continue;
     lose(next, (s.t - kReach - from + kStep - 1) / kStep);
     next = std::max(next, (s.t + kReach - from) / kStep + 1);
   }

@@ -23,9 +23,12 @@ Span judged_span(const ScoreInput& input, const ScoreOptions& options) {
   return span;
 }
 
-std::vector<PosePair> pairs_within(const ScoreInput& input, const ScoreOptions& options, const Span& span) {
+/// Nearest partners may lie a little outside the ground truth's span: only what was asked for cuts them off.
+std::vector<PosePair> pairs_within(const ScoreInput& input, const ScoreOptions& options) {
   std::vector<PosePair> pairs = associate(input.estimate, input.truth, options.association);
-  std::erase_if(pairs, [&](const PosePair& p) { return p.t < span.from || p.t > span.to; });
+  std::erase_if(pairs, [&](const PosePair& p) {
+    return (options.from && p.t < *options.from) || (options.to && p.t > *options.to);
+  });
   return pairs;
 }
 
@@ -103,7 +106,7 @@ TrajectoryScore score_trajectory(const ScoreInput& input, const ScoreOptions& op
   score.alignment = options.alignment;
   if (input.truth.size() < 2) return score;
   const Span span = judged_span(input, options);
-  const std::vector<PosePair> pairs = pairs_within(input, options, span);
+  const std::vector<PosePair> pairs = pairs_within(input, options);
   if (pairs.size() < 2) {
     if (span.from < span.to) score.lost.push_back({span.from, span.to});
     return score;

@@ -116,6 +116,19 @@ Json errors_json(const TrajectoryScore& score, TimeNs origin) {
   return out;
 }
 
+Json lost_json(const TrajectoryScore& score, TimeNs origin) {
+  Json out = Json::array();
+  for (const Stretch& s : score.lost)
+    out.push_back({{"from", to_seconds(s.from - origin)}, {"to", to_seconds(s.to - origin)}});
+  return out;
+}
+
+void add_errors(const TrajectoryScore& score, TimeNs origin, Json* data) {
+  if (score.pairs == 0) return;
+  (*data)["errors"] = errors_json(score, origin);
+  (*data)["lost"] = lost_json(score, origin);
+}
+
 Json latency_json(const StateLog& log, const LatencySummary& latency) {
   constexpr double kLeast_ms = 1e-4;  // the clock's own grain
   double largest_ms = kLeast_ms;
@@ -188,8 +201,9 @@ void add_score_tiles(const TrajectoryScore& score, Json* tiles) {
                           format("rmse %.3g, largest %.3g deg", score.are_deg.rmse, score.are_deg.max)));
   }
   tiles->push_back(tile("Coverage", format("%.1f", std::floor(1000 * score.coverage) / 10), "%",
-                        score.lost.empty() ? "of the ground truth's span"
-                                           : format("%zu stretch(es) without pose", score.lost.size()),
+                        score.lost.empty() ? "of the ground truth"
+                                           : format("of the ground truth; lost %zu time%s", score.lost.size(),
+                                                    score.lost.size() == 1 ? "" : "s"),
                         score.coverage > 0.99  ? "good"
                         : score.coverage > 0.9 ? "warn"
                                                : "bad"));
@@ -214,10 +228,12 @@ void add_run_tiles(const StateLog& log, const RunSummary& summary, Json* tiles) 
   if (summary.wall_s > 0)
     tiles->push_back(tile("Events", format("%.3g", million), "million",
                           format("%.3g million / s processed", million / summary.wall_s)));
-  if (log.rows.size() > 1) {
-    const double data_s = to_seconds(log.rows.back().t - log.rows.front().t);
-    tiles->push_back(tile("Length", format("%.2f", data_s), "s", format("%zu updates", log.rows.size())));
-  }
+  if (log.rows.size() < 2) return;
+  const double data_s = to_seconds(log.rows.back().t - log.rows.front().t);
+  tiles->push_back(tile("Length", format("%.2f", data_s), "s", format("%zu updates", log.rows.size())));
+  if (summary.cpu_s > 0)
+    tiles->push_back(tile("Processor", format("%.0f", 100 * summary.cpu_s / data_s), "%",
+                          format("of a core in real time; memory %.0f MB", summary.peak_memory_mb)));
 }
 
 Json shell(const std::string& title, const std::string& subtitle) {
@@ -230,8 +246,9 @@ Json shell(const std::string& title, const std::string& subtitle) {
 
 void add_paths(std::span<const TimedPose> estimate, std::span<const TimedPose> truth, TimeNs origin,
                Json* data) {
-  if (!estimate.empty()) (*data)["paths"].push_back(path_json("estimate", "estimate", estimate, origin));
+  // The estimate last, so that it lies on top.
   if (!truth.empty()) (*data)["paths"].push_back(path_json("ground truth", "truth", truth, origin));
+  if (!estimate.empty()) (*data)["paths"].push_back(path_json("estimate", "estimate", estimate, origin));
 }
 
 /// The map around the paths; the rest of a large one would only make them small.
@@ -282,7 +299,7 @@ std::string run_page(const RunPage& run) {
   add_paths(estimate, run.truth, origin, &data);
   if (const auto near = points_near(run.summary.map_points, estimate, run.truth); !near.empty())
     data["map"] = columns(spread_indices(near.size(), kMapPoints), 6, [&](std::size_t i) { return near[i]; });
-  if (run.score && run.score->pairs > 0) data["errors"] = errors_json(*run.score, origin);
+  if (run.score) add_errors(*run.score, origin, &data);
   if (!log.rows.empty()) {
     data["activity"] = activity_json(log, origin);
     data["health"] = health_json(log, origin);
@@ -304,7 +321,7 @@ std::string score_page(const std::string& title, const std::string& subtitle, co
   for (const ErrorSample& s : score.samples) estimate.push_back({s.t, s.estimate});
   const TimeNs origin = !truth.empty() ? truth.front().t : 0;
   add_paths(estimate, truth, origin, &data);
-  if (score.pairs > 0) data["errors"] = errors_json(score, origin);
+  add_errors(score, origin, &data);
   return page(data);
 }
 

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdio>
+#include <functional>
+
+#include "evpose/core/error.h"
+
+namespace CLI {
+class App;
+}
+
+namespace evpose {
+
+struct RunOutcome;
+
+// Each adds one subcommand, which stores in `run` what is to be done if it was the one asked for. That
+// returns the exit status: 0 done; 1 ran, but the tracker was lost at the end or a check failed; 2 bad input.
+void add_demo(CLI::App& app, std::function<int()>& run);
+void add_track(CLI::App& app, std::function<int()>& run);
+void add_eval(CLI::App& app, std::function<int()>& run);
+void add_info(CLI::App& app, std::function<int()>& run);
+void add_map(CLI::App& app, std::function<int()>& run);
+
+/// Says what is wrong in one line on stderr; the exit status for it.
+inline int bad_input(const Error& error) {
+  std::fprintf(stderr, "evpose: %s\n", error.line().c_str());
+  return 2;
+}
+
+/// Prints how a run ended; the exit status for it.
+int report_run(const Expected<RunOutcome>& outcome);
+
+}  // namespace evpose

@@ -17,10 +17,10 @@ struct ContourReadOptions {
 };
 
 /// A map to track against, complete: finite points, unit tangents (estimated from neighbours where absent),
-/// normals unit and across the tangent or zero where unknown, lengths (from the spacing where absent). By
-/// content: our contours.ply, any PLY or PCD cloud of edge points with or without normals, or map.h5. Errors:
-/// no points, not finite (which point), isolated points without tangent and normal, gradient columns in
-/// another frame than the points.
+/// normals unit and across the tangent or zero where unknown, lengths (from the spacing where absent). Points
+/// whose tangent cannot be told are left out with a warning. By content: our contours.ply, any PLY or PCD
+/// cloud of edge points with or without normals, or map.h5. Errors: no points, not finite (which point), most
+/// points without a tangent, gradient columns in another frame.
 Expected<ContourMap> read_contour_map(const std::string& path, const ContourReadOptions& options = {});
 
 }  // namespace evpose

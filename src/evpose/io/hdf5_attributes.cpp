@@ -104,6 +104,19 @@ bool Hdf5File::has_attribute(const std::string& object, const std::string& name)
          H5Aexists_by_name(id_.get(), object.c_str(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
+std::vector<std::string> Hdf5File::attributes(const std::string& object) const {
+  std::vector<std::string> names;
+  const auto visit = [](hid_t, const char* name, const H5A_info_t*, void* out) -> herr_t {
+    auto& list = *static_cast<std::vector<std::string>*>(out);
+    list.emplace_back(name);
+    return list.size() < 1000 ? 0 : 1;
+  };
+  H5Aiterate_by_name(id_.get(), object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr, visit, &names,
+                     H5P_DEFAULT);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 std::optional<std::vector<double>> Hdf5File::attribute_numbers(const std::string& object,
                                                                const std::string& name) const {
   if (!has_attribute(object, name)) return std::nullopt;

@@ -45,6 +45,31 @@ hid_t memory_type(NumberType type) {
   return H5I_INVALID_HID;
 }
 
+/// The type whose values are those of a stored one; half and long floats are read as double.
+std::optional<NumberType> number_type(hid_t type) {
+  hid_t number = type;
+  Hdf5Handle base;
+  if (H5Tget_class(type) == H5T_ENUM) {
+    base = own(H5Tget_super(type), H5Tclose);
+    number = base.get();
+  }
+  const std::size_t size = H5Tget_size(number);
+  if (H5Tget_class(number) == H5T_FLOAT) return size == 4 ? NumberType::f32 : NumberType::f64;
+  const bool is_signed = H5Tget_sign(number) == H5T_SGN_2;
+  switch (size) {
+    case 1:
+      return is_signed ? NumberType::i8 : NumberType::u8;
+    case 2:
+      return is_signed ? NumberType::i16 : NumberType::u16;
+    case 4:
+      return is_signed ? NumberType::i32 : NumberType::u32;
+    case 8:
+      return is_signed ? NumberType::i64 : NumberType::u64;
+    default:
+      return std::nullopt;
+  }
+}
+
 std::string filter_name(H5Z_filter_t id) {
   switch (id) {
     case 307:
@@ -162,6 +187,18 @@ std::vector<std::string> Hdf5File::root_groups() const {
   return names;
 }
 
+std::vector<std::string> Hdf5File::datasets() const {
+  std::vector<std::string> names;
+  const auto visit = [](hid_t, const char* name, const H5O_info_t* info, void* out) -> herr_t {
+    auto& list = *static_cast<std::vector<std::string>*>(out);
+    if (info->type == H5O_TYPE_DATASET) list.push_back(std::string("/") + name);
+    return list.size() < 10'000 ? 0 : 1;
+  };
+  H5Ovisit2(id_.get(), H5_INDEX_NAME, H5_ITER_INC, visit, &names, H5O_INFO_BASIC);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions) const {
   const std::string where = path_ + ": " + name;
   if (!has(name)) return Error{path_, "no dataset " + name, "is it the right file?"};
@@ -174,7 +211,10 @@ Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions)
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM)
     return Error{where, "does not hold numbers", "is it the right file?"};
-  out.floating_ = kind == H5T_FLOAT;
+  const auto number = number_type(type.get());
+  if (!number)
+    return Error{where, "holds numbers of an unusual type", "use integers and floats of 8 to 64 bits"};
+  out.type_ = *number;
   const auto space = own(H5Dget_space(out.id_.get()), H5Sclose);
   const int rank = H5Sget_simple_extent_ndims(space.get());
   if (rank < 0 || (dimensions >= 0 && rank != dimensions))

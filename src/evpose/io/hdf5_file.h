@@ -44,7 +44,8 @@ class Hdf5Dataset {
   const std::string& name() const { return name_; }
   const Hdf5Shape& shape() const { return shape_; }
   std::uint64_t rows() const { return shape_.empty() ? 1 : shape_[0]; }
-  bool is_floating() const { return floating_; }
+  NumberType type() const { return type_; }  ///< as stored
+  bool is_floating() const { return type_ == NumberType::f32 || type_ == NumberType::f64; }
 
   /// Rows [first, first + count), as `type`, in C order.
   Status read(NumberType type, std::uint64_t first, std::uint64_t count, void* out) const;
@@ -56,7 +57,7 @@ class Hdf5Dataset {
   std::string path_, name_;
   Hdf5Handle id_;
   Hdf5Shape shape_;
-  bool floating_ = false;
+  NumberType type_ = NumberType::f64;
 };
 
 /// An HDF5 file, to be read or being written. The library's own messages are silenced.
@@ -72,7 +73,9 @@ class Hdf5File {
   std::int64_t size() const { return size_; }  ///< bytes of the file when opened
 
   bool has(const std::string& object) const;
-  std::vector<std::string> root_groups() const;  ///< sorted by name
+  std::vector<std::string> root_groups() const;                          ///< sorted by name
+  std::vector<std::string> datasets() const;                             ///< full names of all, sorted
+  std::vector<std::string> attributes(const std::string& object) const;  ///< names, sorted
   /// Errors: absent, not numbers, more than `dimensions` (any if -1), compressed with a filter that is not
   /// installed, more content than the file can hold.
   Expected<Hdf5Dataset> dataset(const std::string& name, int dimensions = -1) const;

@@ -8,13 +8,14 @@
 
 namespace evpose {
 
-/// map.h5 1.0. Polygons become triangles of the occluder mesh. A contour of one row is an isolated point, as
-/// is a row that belongs to no contour. Errors: not a map file, another major version or unit, an unknown
-/// required feature, a dataset whose checksum, shape or content is wrong (named).
+/// map.h5 1.0: contours, points and the mesh of occluders. A contour of one row is an isolated point, as is a
+/// row that belongs to no contour; lengths of points are shares of their contour's. Errors: not a map file,
+/// another major version or unit, an unknown required feature, a dataset whose checksum, shape or content is
+/// wrong (named).
 Expected<ContourMap> read_map_h5(const std::string& path);
 
-/// Points of one contour that differ in kind, planes or contrast are written as several contours; lengths of
-/// points are kept as the length of their contour.
-Status write_map_h5(const std::string& path, const ContourMap& map);
+/// Contours are numbered anew, in the order of their first points; points of one contour that differ in kind,
+/// planes or contrast become several. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes.
+Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc = "");
 
 }  // namespace evpose

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "evpose/core/error.h"
+#include "evpose/io/hdf5_file.h"
+
+namespace evpose {
+
+/// Checksum of a map file as a whole: of its datasets' names, shapes and own checksums, and of the attributes
+/// of /meta (formats 3).
+Expected<std::uint32_t> map_checksum(const Hdf5File& file);
+
+}  // namespace evpose

@@ -22,7 +22,7 @@ struct RawEvents {
 };
 
 /// Whole microseconds farther than this from zero have no time in nanoseconds.
-inline constexpr std::int64_t kLargestTimeUs = 4'000'000'000'000'000;
+inline constexpr std::int64_t kLargestTimeUs = 3'000'000'000'000'000;
 
 /// Checks raw events and cuts them into packets: what all event formats share.
 class EventPacker {

@@ -142,7 +142,7 @@ Expected<KalibrCamera> read_kalibr_camera(const std::string& path, int index) {
   if (const YamlNode* shift = camera->find("timeshift_cam_imu")) {
     const auto value = document->number(*shift, "timeshift_cam_imu");
     if (!value) return value.error();
-    if (std::abs(*value) > 1e9)
+    if (std::abs(*value) > 1e6)
       return document->error(*shift, text("timeshift_cam_imu: ", *value, " s is out of range"),
                              "give seconds");
     out.timeshift_cam_imu_s = *value;

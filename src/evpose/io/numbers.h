@@ -22,8 +22,9 @@ bool parse_decimal(std::string_view text, int decimals, std::int64_t& out);
 /// Parts between blanks, tabs or commas; empty parts between two commas are kept.
 void split_fields(std::string_view line, std::vector<std::string_view>& fields);
 
-/// Stamps of files are at most this far from zero (year 2096), so that their differences fit 64 bits.
-inline constexpr std::int64_t kLargestTimeNs = 4'000'000'000'000'000'000;
+/// Stamps of files are at most this far from zero (year 2065), so that their differences fit 64 bits
+/// with any offset.
+inline constexpr std::int64_t kLargestTimeNs = 3'000'000'000'000'000'000;
 
 std::string_view trimmed(std::string_view text);
 

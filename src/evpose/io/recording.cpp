@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/recording.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/io/imu_units.h"
+#include "evpose/io/kalibr.h"
+#include "evpose/io/numbers.h"
+#include "evpose/io/recording_yaml.h"
+#include "evpose/io/trajectory_tum.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kOtherEpoch_s = 1e8;
+
+bool exists(const std::string& path) {
+  struct stat info = {};
+  return ::stat(path.c_str(), &info) == 0;
+}
+
+bool is_folder(const std::string& path) {
+  struct stat info = {};
+  return ::stat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+/// A file named in recording.yaml must be there; one of the default name may be absent (then "").
+std::string optional_file(const std::string& folder, const std::optional<std::string>& named,
+                          const char* usual) {
+  const std::string path = folder + "/" + named.value_or(usual);
+  return named || exists(path) ? path : "";
+}
+
+TimeNs to_ns(const std::optional<double>& seconds) { return seconds ? from_seconds(*seconds) : 0; }
+
+std::string in_seconds(TimeNs t) { return format_decimal(t / kNsPerUs, 6) + " s"; }
+
+Status take_files(const RecordingOverrides& overrides, Recording& r) {
+  r.name = !overrides.name.empty() ? overrides.name : r.folder.substr(r.folder.rfind('/') + 1);
+  r.events_path = r.folder + "/" + overrides.events.value_or("events.h5");
+  r.calibration_path = r.folder + "/" + overrides.calibration.value_or("camchain-imucam.yaml");
+  r.imu_path = optional_file(r.folder, overrides.imu, "imu.csv");
+  r.groundtruth_path = optional_file(r.folder, overrides.groundtruth, "groundtruth.tum");
+  r.contours_path = optional_file(r.folder, overrides.contours, "contours.ply");
+  r.map_path = optional_file(r.folder, overrides.map, "map.h5");
+  r.has_imu = !r.imu_path.empty();
+  if (r.has_imu) r.imu_model_path = r.folder + "/" + overrides.imu_model.value_or("imu.yaml");
+  for (const std::string& path : {r.events_path, r.calibration_path, r.imu_path, r.imu_model_path,
+                                  r.groundtruth_path, r.contours_path, r.map_path}) {
+    if (!path.empty() && !exists(path))
+      return Error{path, "no such file", "add it, or name another under files: in recording.yaml"};
+  }
+  return {};
+}
+
+Status take_calibration(const RecordingOverrides& overrides, Recording& r, double& timeshift_s) {
+  const auto camera = read_kalibr_camera(r.calibration_path, overrides.camera_index);
+  if (!camera) return camera.error();
+  r.camera = camera->intrinsics;
+  r.T_cam_body = camera->T_cam_body;
+  timeshift_s = camera->timeshift_cam_imu_s;
+  if (!r.has_imu) return {};
+  if (!camera->has_extrinsics)
+    return Error{r.calibration_path,
+                 text("no T_cam_imu for cam", overrides.camera_index, ", but there is an IMU"),
+                 "calibrate camera and IMU together, or remove " + r.imu_path + " to track without it"};
+  const auto noise = read_kalibr_imu(r.imu_model_path);
+  if (!noise) return noise.error();
+  r.imu_noise = *noise;
+  return {};
+}
+
+Status take_groundtruth(const RecordingOverrides& overrides, const std::string& yaml, Recording& r) {
+  r.groundtruth_offset_ns = to_ns(overrides.offset_groundtruth_s);
+  if (overrides.groundtruth_body == "marker" && !overrides.T_body_imu)
+    return Error{yaml, "groundtruth.body is marker, but groundtruth.T_body_imu is missing",
+                 "give the transform from the IMU to the marker"};
+  if (overrides.groundtruth_body != "imu") r.T_stored_body = overrides.T_body_imu.value_or(r.T_cam_body);
+  if (overrides.T_map_world) r.T_map_world = *overrides.T_map_world;
+  const bool named = !overrides.world_frame.empty() && !overrides.map_frame.empty();
+  if (named && overrides.world_frame != overrides.map_frame && !overrides.T_map_world)
+    return Error{yaml,
+                 "groundtruth.world is '" + overrides.world_frame + "' and frames.map is '" +
+                     overrides.map_frame + "', but frames.T_map_world is missing",
+                 "give the transform from the world to the map"};
+  return {};
+}
+
+void take_options(const RecordingOverrides& overrides, double timeshift_s, Recording& r) {
+  r.events_format = overrides.events_format;
+  r.event_options = overrides.event_options;
+  r.event_options.offset_ns = from_seconds(timeshift_s) + to_ns(overrides.offset_events_s);
+  r.imu_options = overrides.imu_options;
+  if (overrides.t_start_s)
+    r.event_options.t_start_ns = r.imu_options.t_start_ns = from_seconds(*overrides.t_start_s);
+  if (overrides.t_end_s) r.event_options.t_end_ns = r.imu_options.t_end_ns = from_seconds(*overrides.t_end_s);
+  r.T_ned_map = overrides.T_ned_map;
+  r.initial_pose = overrides.initial_pose;
+}
+
+/// Opens the events once: their size against the calibration's, and their span.
+Status probe_events(Recording& r) {
+  const auto reader = open_events(r.events_path, r.events_format, r.event_options);
+  if (!reader) return reader.error();
+  const ImageSize stated = (*reader)->size();
+  if (stated != ImageSize{} && stated != r.camera.size)
+    return Error{r.calibration_path,
+                 text("resolution is ", r.camera.size.width, " x ", r.camera.size.height,
+                      ", that of the events ", stated.width, " x ", stated.height),
+                 "correct it, or set events.resolution in recording.yaml"};
+  r.event_options.size = r.camera.size;
+  const EventExtent extent = (*reader)->extent();
+  r.first_ns = extent.first_ns;
+  r.last_ns = extent.last_ns;
+  r.event_count = extent.count;
+  return {};
+}
+
+/// What one pass over the IMU file tells.
+struct ImuSummary {
+  TimeNs first = 0, last = 0;
+  ImuUnitCheck units;
+  std::vector<ImuSample> start;  ///< for the comparison with the ground truth
+};
+
+constexpr std::size_t kMostCompared = 100'000;
+
+Expected<ImuSummary> read_through(const Recording& r) {
+  auto reader = ImuReader::open(r.imu_path, r.imu_options);
+  if (!reader) return reader.error();
+  ImuSummary summary;
+  ImuSample sample;
+  while (true) {
+    const auto more = reader->next(sample);
+    if (!more) return more.error();
+    if (!*more) break;
+    if (summary.units.count() == 0) summary.first = sample.t;
+    summary.last = sample.t;
+    summary.units.add(sample);
+    if (summary.start.size() < kMostCompared) summary.start.push_back(sample);
+  }
+  if (summary.units.count() < 2)
+    return Error{r.imu_path,
+                 text(summary.units.count(), " samples", r.imu_options.t_start_ns ? " inside the crop" : ""),
+                 "record the IMU over the whole time, or remove the file"};
+  return summary;
+}
+
+Status check_units(const Recording& r, const RecordingOverrides& overrides, const ImuSummary& summary) {
+  // A stated unit is taken at its word.
+  if (!overrides.states_accel_unit && !overrides.states_gyro_unit) {
+    if (auto status = summary.units.check(r.imu_path); !status) return status;
+  }
+  if (overrides.states_gyro_unit || r.groundtruth_path.empty()) return {};
+  const auto groundtruth = read_groundtruth(r);
+  if (!groundtruth) return groundtruth.error();
+  return check_gyro_against(*groundtruth, summary.start, r.imu_path);
+}
+
+Status check_overlap(const Recording& r, const ImuSummary& imu, bool has_offset) {
+  const double apart = std::abs(to_seconds(r.first_ns - imu.first));
+  if (apart > kOtherEpoch_s && !has_offset)
+    return Error{r.imu_path,
+                 text("the IMU starts at ", in_seconds(imu.first), ", the events at ", in_seconds(r.first_ns),
+                      ": different epochs, they do not overlap"),
+                 "set time.offset_events_s, or correct events.time_unit or imu.time_unit"};
+  if (r.last_ns >= imu.first && r.first_ns <= imu.last) return {};
+  return Error{r.imu_path,
+               text("the IMU spans ", in_seconds(imu.first), " to ", in_seconds(imu.last), ", the events ",
+                    in_seconds(r.first_ns), " to ", in_seconds(r.last_ns), ": they do not overlap"),
+               "set time.offset_events_s, or correct events.time_unit or imu.time_unit"};
+}
+
+Status check_imu(const RecordingOverrides& overrides, Recording& r) {
+  const auto imu = read_through(r);
+  if (!imu) return imu.error();
+  if (auto status = check_units(r, overrides, *imu); !status) return status;
+  if (auto status = check_overlap(r, *imu, overrides.offset_events_s.has_value()); !status) return status;
+  r.first_ns = std::max(r.first_ns, imu->first);
+  r.last_ns = std::min(r.last_ns, imu->last);
+  return {};
+}
+
+Status crop(const std::string& yaml, Recording& r) {
+  if (r.event_options.t_start_ns) r.first_ns = std::max(r.first_ns, *r.event_options.t_start_ns);
+  if (r.event_options.t_end_ns) r.last_ns = std::min(r.last_ns, *r.event_options.t_end_ns);
+  if (r.first_ns > r.last_ns)
+    return Error{yaml, "time.t_start_s and time.t_end_s leave nothing of the recording",
+                 "choose times inside it"};
+  return {};
+}
+
+}  // namespace
+
+Expected<Recording> open_recording(const std::string& folder) {
+  if (!exists(folder)) return Error{folder, "no such recording folder", "check the path"};
+  if (!is_folder(folder)) return Error{folder, "is not a folder", "name the recording's folder"};
+  Recording r;
+  r.folder = folder;
+  while (r.folder.size() > 1 && r.folder.ends_with('/')) r.folder.pop_back();
+  const std::string yaml = r.folder + "/recording.yaml";
+  RecordingOverrides overrides;
+  if (exists(yaml)) {
+    auto read = read_recording_yaml(yaml);
+    if (!read) return read.error();
+    overrides = *std::move(read);
+  }
+  double timeshift_s = 0;
+  if (auto status = take_files(overrides, r); !status) return status.error();
+  if (auto status = take_calibration(overrides, r, timeshift_s); !status) return status.error();
+  if (auto status = take_groundtruth(overrides, yaml, r); !status) return status.error();
+  take_options(overrides, timeshift_s, r);
+  if (auto status = probe_events(r); !status) return status.error();
+  if (r.has_imu) {
+    if (auto status = check_imu(overrides, r); !status) return status.error();
+  }
+  if (auto status = crop(yaml, r); !status) return status.error();
+  return r;
+}
+
+Expected<std::unique_ptr<EventReader>> open_events(const Recording& recording, double packet_s) {
+  EventReadOptions options = recording.event_options;
+  options.packet_s = packet_s;
+  return open_events(recording.events_path, recording.events_format, options);
+}
+
+Expected<ImuReader> open_imu(const Recording& recording) {
+  EVPOSE_CHECK(recording.has_imu);
+  return ImuReader::open(recording.imu_path, recording.imu_options);
+}
+
+Expected<std::vector<TimedPose>> read_groundtruth(const Recording& recording) {
+  if (recording.groundtruth_path.empty())
+    return Error{recording.folder + "/groundtruth.tum", "no such file: the recording has no ground truth",
+                 "add it"};
+  auto trajectory = read_tum(recording.groundtruth_path);
+  if (!trajectory) return trajectory.error();
+  for (TimedPose& row : *trajectory) {
+    row.t += recording.groundtruth_offset_ns;
+    row.pose = recording.T_map_world * row.pose;
+    if (recording.T_stored_body) row.pose = row.pose * *recording.T_stored_body;
+  }
+  return trajectory;
+}
+
+}  // namespace evpose

@@ -29,16 +29,21 @@ void ImuUnitCheck::add(const ImuSample& sample) {
   beyond_range_ += sample.gyro.cwiseAbs().maxCoeff() > kSensorRange ? 1 : 0;
 }
 
-Status ImuUnitCheck::check(const std::string& where) const {
+Status ImuUnitCheck::check_accel(const std::string& where) const {
   if (count_ < kFewest) return {};
   const double accel = accel_sum_ / static_cast<double>(count_);
-  const double gyro = std::sqrt(gyro_square_sum_ / static_cast<double>(count_));
   if (accel > 0.6 && accel < 2)
     return Error{where, text("mean |acceleration| is ", accel, ": the accelerometer is in g, not m/s^2"),
                  "set imu.accel_unit: g in recording.yaml"};
   if (accel <= 0.6)
     return Error{where, text("mean |acceleration| is ", accel, " m/s^2: gravity has been removed"),
                  "store the specific force as measured, about 9.81 m/s^2 upwards at rest"};
+  return {};
+}
+
+Status ImuUnitCheck::check_gyro(const std::string& where) const {
+  if (count_ < kFewest) return {};
+  const double gyro = std::sqrt(gyro_square_sum_ / static_cast<double>(count_));
   // A single outlier may be a bump; a hundredth of the samples is no bump.
   if (gyro > kFastestOnTheWhole || beyond_range_ * 100 > count_)
     return degrees(where, text("the rates' root mean square is ", gyro));
@@ -48,7 +53,8 @@ Status ImuUnitCheck::check(const std::string& where) const {
 Status check_imu_units(const std::vector<ImuSample>& samples, const std::string& where) {
   ImuUnitCheck check;
   for (const ImuSample& s : samples) check.add(s);
-  return check.check(where);
+  if (auto status = check.check_accel(where); !status) return status;
+  return check.check_gyro(where);
 }
 
 Status check_gyro_against(const std::vector<TimedPose>& reference, const std::vector<ImuSample>& samples,

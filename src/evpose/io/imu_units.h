@@ -25,7 +25,8 @@ class ImuUnitCheck {
   std::int64_t count() const { return count_; }
   /// Errors name the key to set: `imu.accel_unit: g`, `imu.gyro_unit: deg/s`. Nothing is said of fewer than
   /// 10 samples.
-  Status check(const std::string& where) const;
+  Status check_accel(const std::string& where) const;
+  Status check_gyro(const std::string& where) const;
 
  private:
   std::int64_t count_ = 0;
@@ -34,7 +35,7 @@ class ImuUnitCheck {
   std::int64_t beyond_range_ = 0;  ///< samples with a rate beyond a sensor's range
 };
 
-/// ImuUnitCheck of all samples.
+/// Both checks of ImuUnitCheck on all samples.
 Status check_imu_units(const std::vector<ImuSample>& samples, const std::string& where);
 
 /// Compares the angles that the gyroscope and the reference turned over windows of half a second: finds rates

@@ -151,10 +151,12 @@ Expected<ImuSummary> read_through(const Recording& r) {
 
 Status check_units(const Recording& r, const RecordingOverrides& overrides, const ImuSummary& summary) {
   // A stated unit is taken at its word.
-  if (!overrides.states_accel_unit && !overrides.states_gyro_unit) {
-    if (auto status = summary.units.check(r.imu_path); !status) return status;
+  if (!overrides.states_accel_unit) {
+    if (auto status = summary.units.check_accel(r.imu_path); !status) return status;
   }
-  if (overrides.states_gyro_unit || r.groundtruth_path.empty()) return {};
+  if (overrides.states_gyro_unit) return {};
+  if (auto status = summary.units.check_gyro(r.imu_path); !status) return status;
+  if (r.groundtruth_path.empty()) return {};
   const auto groundtruth = read_groundtruth(r);
   if (!groundtruth) return groundtruth.error();
   return check_gyro_against(*groundtruth, summary.start, r.imu_path);

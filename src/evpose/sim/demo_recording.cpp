@@ -155,7 +155,7 @@ Status write_events(const std::string& path, const Scene& scene, const Trajector
 
 Status make_demo_recording(const std::string& folder, const DemoOptions& options,
                            const std::function<void(double)>& progress) {
-  if (const Status good = check(options); !good) return good;
+  if (Status good = check(options); !good) return good;
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed)
@@ -184,7 +184,7 @@ Status make_demo_recording(const std::string& folder, const DemoOptions& options
       [&] { return write_events(path("events.h5"), scene, trajectory, rig, pixels, options, progress); },
   };
   for (const auto& step : steps) {
-    if (const Status done = step(); !done) return done;
+    if (Status done = step(); !done) return done;
   }
   return {};
 }

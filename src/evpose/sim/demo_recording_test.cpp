@@ -20,7 +20,7 @@ class DemoRecording : public ::testing::Test {
   std::string make(const std::string& name, DemoOptions options) {
     options.size = {96, 72};
     options.duration_s = 0.08;
-    const std::string folder = (base_ / name).string();
+    std::string folder = (base_ / name).string();
     const Status made = make_demo_recording(folder, options, [&](double share) { last_share_ = share; });
     EXPECT_TRUE(made.ok()) << (made.ok() ? "" : made.error().line());
     return folder;

@@ -76,7 +76,9 @@ TEST(EventPixels, ResetHoldsThePixelForTheRefractoryTime) {
   const auto events = run(EventPixels({1, 1}, config, 1), 1, 1000 * kNsPerUs, 3 * kNsPerMs, 1,
                           [&](std::size_t, double t) { return 0.1 + 0.5 * std::min(1.0, t / 1e-3); });
   std::vector<double> expected_s;
-  for (double reference = 0.1, t; (t = (reference * std::exp(0.24) - 0.1) / 0.5 * 1e-3) < 1e-3;) {
+  for (double reference = 0.1;;) {
+    const double t = (reference * std::exp(0.24) - 0.1) / 0.5 * 1e-3;
+    if (t > 1e-3) break;
     expected_s.push_back(t);
     reference = 0.1 + 0.5 * (t + 100e-6) / 1e-3;
   }

@@ -44,7 +44,8 @@ TEST(Renderer, APixelIsTheMeanOverItsArea) {
     for (int x = 0; x < 96; ++x) {
       double mean = 0;
       for (int i = 0; i < kFine * kFine; ++i) {
-        const Eigen::Vector2d pixel(x - 0.5 + (i % kFine + 0.5) / kFine, y - 0.5 + (i / kFine + 0.5) / kFine);
+        const int column = i % kFine, row = i / kFine;
+        const Eigen::Vector2d pixel(x - 0.5 + (column + 0.5) / kFine, y - 0.5 + (row + 0.5) / kFine);
         const SceneHit hit = *scene.trace(T_map_cam.p, T_map_cam.q * *camera->unproject(pixel));
         mean += scene.boxes[hit.face / 6].faces[0].mean(0, 0, 0, 0) / (kFine * kFine);
       }

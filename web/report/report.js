@@ -88,6 +88,7 @@ function layout(more) {
     dragmode: touch ? false : "zoom",
     margin: { l: 52, r: 12, t: 28, b: 42 },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 }, itemsizing: "constant" },
+    showlegend: true,
     hovermode: "x unified",
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
     ...more,
@@ -198,7 +199,7 @@ const distribution = (cdf, unit) => () => ({
   layout: layout({
     xaxis: axis(`error [${unit}]`, { rangemode: "tozero" }),
     yaxis: axis("share of poses within", { range: [0, 1.02], tickformat: ".0%" }),
-    hovermode: "closest", showlegend: true,
+    hovermode: "closest",
   }),
 });
 
@@ -268,10 +269,11 @@ function errors(page) {
   const e = run.errors;
   if (!e) return;
   const row = section(page, "Error against ground truth", e.about);
+  const bounds = e.position.some((a) => a.bound) ? "; shaded: 3 sigma of the covariance" : "";
   card(row, "ate", "Position error", "", errorOverTime(e.ate, e.ate_bound, "mm"));
   card(row, "are", "Rotation error", "", errorOverTime(e.are, e.are_bound, "deg"));
-  card(row, "position-axes", "Position error by axis of the map", "estimate minus truth", errorByAxis(e.position, "mm"));
-  card(row, "rotation-axes", "Rotation error by axis of the body", "estimate relative to truth", errorByAxis(e.rotation, "deg"));
+  card(row, "position-axes", "Position error by axis of the map", "estimate minus truth" + bounds, errorByAxis(e.position, "mm"));
+  card(row, "rotation-axes", "Rotation error by axis of the body", "estimate relative to truth" + bounds, errorByAxis(e.rotation, "deg"));
   card(row, "cdf-ate", "Distribution of the position error (ATE)", "", distribution(e.cdf_ate, "mm"));
   card(row, "cdf-are", "Distribution of the rotation error (ARE)", "", distribution(e.cdf_are, "deg"));
 }

@@ -31,6 +31,12 @@ const char* to_string(Alignment alignment) {
   return "";
 }
 
+Matrix6d Similarity::covariance(const Matrix6d& of_pose) const {
+  Matrix6d J = Matrix6d::Identity();
+  J.topLeftCorner<3, 3>() = scale * q.toRotationMatrix();
+  return J * of_pose * J.transpose();
+}
+
 Similarity align(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to, Alignment kind) {
   EVPOSE_CHECK(from.size() == to.size());
   Similarity out;

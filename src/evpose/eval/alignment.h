@@ -26,6 +26,8 @@ struct Similarity {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
 
   Pose operator*(const Pose& pose) const { return {q * pose.q, scale * (q * pose.p) + p}; }
+  /// Covariance of *this * pose: translation turns and scales with the frame, rotation is the body's own.
+  Matrix6d covariance(const Matrix6d& of_pose) const;
 };
 
 /// The transform that takes `from` to `to` with the least sum of squared distances (Umeyama). Equal counts.

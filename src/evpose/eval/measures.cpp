@@ -6,8 +6,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "evpose/core/error.h"
-
 namespace evpose {
 namespace {
 
@@ -150,15 +148,14 @@ std::optional<double> along_motion(std::span<const ErrorSample> samples,
 }
 
 std::optional<Consistency> consistency(std::span<const ErrorSample> samples,
-                                       std::span<const Matrix6d> covariances) {
-  EVPOSE_CHECK(samples.size() == covariances.size());
+                                       std::span<const Matrix6d> covariances, const Similarity& alignment) {
   constexpr double kBandLow = 1.237344, kBandHigh = 14.449375;  // 2.5 % and 97.5 % of chi-square, 6 degrees
   double sum = 0;
   int count = 0, in_band = 0;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const Eigen::LLT<Matrix6d> factor(covariances[i]);
+  for (const ErrorSample& s : samples) {
+    const Eigen::LLT<Matrix6d> factor(alignment.covariance(covariances[s.index]));
     if (factor.info() != Eigen::Success) continue;
-    const Vector6d d = samples[i].truth.minus(samples[i].estimate);
+    const Vector6d d = s.truth.minus(s.estimate);
     const double nees = factor.matrixL().solve(d).squaredNorm();
     sum += nees;
     in_band += nees >= kBandLow && nees <= kBandHigh;

@@ -45,8 +45,9 @@ struct Consistency {
   double share_in_band =
       0;  ///< of single values inside the central 95 % of chi-square with 6 degrees of freedom
 };
-/// `covariances`: one for each sample; samples whose covariance is not positive definite are left out.
+/// `covariances` of the poses before alignment, by ErrorSample::index; what is not positive definite is left
+/// out.
 std::optional<Consistency> consistency(std::span<const ErrorSample> samples,
-                                       std::span<const Matrix6d> covariances);
+                                       std::span<const Matrix6d> covariances, const Similarity& alignment);
 
 }  // namespace evpose

@@ -89,8 +89,8 @@ std::string output_of(const std::string& command) {
 
 /// A Python that has numpy: the distribution's may not be the first in PATH.
 std::string python_with_numpy() {
-  for (const std::string python : {"python3", "/usr/bin/python3"})
-    if (!output_of(python + " -c 'import numpy; print(1)'").empty()) return python;
+  for (const char* python : {"python3", "/usr/bin/python3"})
+    if (!output_of(std::string(python) + " -c 'import numpy; print(1)'").empty()) return python;
   return {};
 }
 

@@ -42,14 +42,6 @@ Similarity fit(const std::vector<PosePair>& pairs, const ScoreOptions& options) 
   return align(from, to, options.alignment);
 }
 
-/// The covariance of the aligned pose: translation turns and scales with the frame, rotation is the body's
-/// own.
-Matrix6d aligned_covariance(const Matrix6d& covariance, const Similarity& T) {
-  Matrix6d J = Matrix6d::Identity();
-  J.topLeftCorner<3, 3>() = T.scale * T.q.toRotationMatrix();
-  return J * covariance * J.transpose();
-}
-
 std::vector<ErrorSample> errors_of(const std::vector<PosePair>& pairs, const ScoreInput& input,
                                    const Similarity& T) {
   std::vector<ErrorSample> samples;
@@ -65,7 +57,7 @@ std::vector<ErrorSample> errors_of(const std::vector<PosePair>& pairs, const Sco
     s.position_error = d.head<3>();
     s.rotation_error = d.tail<3>();
     if (!input.covariances.empty())
-      s.sigma = aligned_covariance(input.covariances[pair.index], T).diagonal().cwiseMax(0).cwiseSqrt();
+      s.sigma = T.covariance(input.covariances[pair.index]).diagonal().cwiseMax(0).cwiseSqrt();
     samples.push_back(s);
   }
   return samples;
@@ -82,10 +74,7 @@ void measure_optional_inputs(const ScoreInput& input, TrajectoryScore* score) {
   }
   if (!input.pixels_per_metre.empty()) score->along_motion_px = along_motion(samples, input.pixels_per_metre);
   if (!input.covariances.empty()) {
-    std::vector<Matrix6d> covariances;
-    for (const ErrorSample& s : samples)
-      covariances.push_back(aligned_covariance(input.covariances[s.index], T));
-    if (const auto nees = consistency(samples, covariances)) {
+    if (const auto nees = consistency(samples, input.covariances, T)) {
       score->nees6_mean = nees->mean;
       score->nees6_in_band = nees->share_in_band;
     }

@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
-constexpr std::size_t kSeriesPoints = 2000, kPathPoints = 3000, kMapPoints = 6000;
+constexpr std::size_t kSeriesPoints = 2000, kPathPoints = 3000, kMapPoints = 6000, kMarks = 300;
 
 std::string format(const char* pattern, auto... values) {
   char out[200];
@@ -116,9 +116,16 @@ Json errors_json(const TrajectoryScore& score, TimeNs origin) {
   return out;
 }
 
+/// The longest ones, in order of time: a browser would be slow to draw thousands.
 Json lost_json(const TrajectoryScore& score, TimeNs origin) {
+  std::vector<Stretch> longest = score.lost;
+  const auto longer = [](const Stretch& a, const Stretch& b) { return a.length_s() > b.length_s(); };
+  std::stable_sort(longest.begin(), longest.end(), longer);
+  longest.resize(std::min(longest.size(), kMarks));
+  std::sort(longest.begin(), longest.end(),
+            [](const Stretch& a, const Stretch& b) { return a.from < b.from; });
   Json out = Json::array();
-  for (const Stretch& s : score.lost)
+  for (const Stretch& s : longest)
     out.push_back({{"from", to_seconds(s.from - origin)}, {"to", to_seconds(s.to - origin)}});
   return out;
 }
@@ -177,7 +184,7 @@ Json activity_json(const StateLog& log, TimeNs origin) {
 
 Json health_json(const StateLog& log, TimeNs origin) {
   Json out = Json::array();
-  for (std::size_t i = 0; i < log.health.size(); ++i) {
+  for (std::size_t i = 0; i < std::min(log.health.size(), kMarks); ++i) {
     const HealthChange& h = log.health[i];
     const TimeNs end = i + 1 < log.health.size() ? log.health[i + 1].t : log.rows.back().t;
     out.push_back({{"from", to_seconds(h.t - origin)},
@@ -185,6 +192,9 @@ Json health_json(const StateLog& log, TimeNs origin) {
                    {"state", to_string(h.health)},
                    {"reason", h.reason}});
   }
+  if (log.health.size() > kMarks)
+    out.back()["reason"] = log.health[kMarks - 1].reason +
+                           format(" (%zu more changes: see states.csv)", log.health.size() - kMarks);
   return out;
 }
 

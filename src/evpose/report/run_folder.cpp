@@ -93,14 +93,14 @@ Status RunFolder::State::write_trajectories(const Pose& T_body_cam) const {
     body.push_back({row.t, row.T_map_body});
     camera.push_back({row.t, row.T_map_body * T_body_cam});
   }
-  const Status written = write_tum(file("trajectory.tum"), body, "t x y z qx qy qz qw (map <- body)");
+  Status written = write_tum(file("trajectory.tum"), body, "t x y z qx qy qz qw (map <- body)");
   if (!written) return written;
   return write_tum(file("trajectory_camera.tum"), camera, "t x y z qx qy qz qw (map <- camera)");
 }
 
 Status RunFolder::State::move_into_place() {
   // The place may have changed since the start of the run.
-  if (const Status free = check_place(place); !free) return free;
+  if (Status free = check_place(place); !free) return free;
   std::error_code error;
   const fs::path old = folder.string() + ".old";
   const bool replaces = fs::exists(place, error);

@@ -165,9 +165,12 @@ std::string score_text(const TrajectoryScore& score) {
   out += line("\n%-24s %.4f", "coverage", score.coverage);
   out += line("\n%-24s %s", "alignment", to_string(score.alignment));
   for (const auto& [name, value] : score.words()) out += line("\n%-24s %.6g", name.c_str(), value);
-  for (const Stretch& s : score.lost)
-    out += line("\n%-24s %.3f s .. %.3f s", "lost", seconds(s.from), seconds(s.to));
-  return out;
+  if (score.lost.empty()) return out;
+  const auto longest =
+      std::max_element(score.lost.begin(), score.lost.end(),
+                       [](const Stretch& a, const Stretch& b) { return a.length_s() < b.length_s(); });
+  return out + line("\n%-24s %zu time%s, longest %.3f s .. %.3f s", "lost", score.lost.size(),
+                    score.lost.size() == 1 ? "" : "s", seconds(longest->from), seconds(longest->to));
 }
 
 std::string summary_text(const StateLog& log, const RunSummary& summary,

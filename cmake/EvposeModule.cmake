@@ -20,6 +20,9 @@ function(evpose_module name)
 endfunction()
 
 add_library(evpose_options INTERFACE)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  target_compile_options(evpose_options INTERFACE -Wno-restrict)  # false alarms about std::string of GCC 12 at -O3
+endif()
 target_compile_options(evpose_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wno-float-conversion -Wnon-virtual-dtor)
 if(EVPOSE_WERROR)

@@ -19,7 +19,6 @@ struct RunOutcome;
 void add_demo(CLI::App& app, std::function<int()>& run);
 void add_track(CLI::App& app, std::function<int()>& run);
 void add_eval(CLI::App& app, std::function<int()>& run);
-void add_info(CLI::App& app, std::function<int()>& run);
 void add_map(CLI::App& app, std::function<int()>& run);
 
 /// Says what is wrong in one line on stderr; the exit status for it.

@@ -22,7 +22,6 @@ int main(int argc, char** argv) {
   add_demo(app, run);
   add_track(app, run);
   add_eval(app, run);
-  add_info(app, run);
   add_map(app, run);
   try {
     app.parse(argc, argv);

@@ -132,7 +132,8 @@ Status PlyFile::read_header() {
         return Error{path_, "is not a PLY file: its first line is not 'ply'", "check the format"};
       continue;
     }
-    if (words_.empty() || words_[0] == "comment" || words_[0] == "obj_info") continue;
+    // Free text: commas in it are no separators.
+    if (words_.empty() || line.starts_with("comment") || line.starts_with("obj_info")) continue;
     if (words_[0] == "end_header") {
       if (!has_format) return header_error("no format line");
       return {};

@@ -15,9 +15,7 @@ KannalaBrandt::KannalaBrandt(const CameraIntrinsics& intrinsics)
   valid_angle_ = fold_angle([this](double angle) { return radius_slope(angle); }, std::numbers::pi);
 }
 
-double KannalaBrandt::focal_px() const {
-  return std::sqrt(fx_ * fy_);
-}
+double KannalaBrandt::focal_px() const { return std::sqrt(fx_ * fy_); }
 
 double KannalaBrandt::radius(double a) const {
   const double a2 = a * a;

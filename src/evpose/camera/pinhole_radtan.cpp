@@ -14,9 +14,7 @@ namespace {
 // Nearer to the image plane than this a pinhole's pixel says nothing about the direction.
 constexpr double kMaxAngle = 89.9 * std::numbers::pi / 180;
 
-double square(double a) {
-  return a * a;
-}
+double square(double a) { return a * a; }
 
 }  // namespace
 
@@ -36,9 +34,7 @@ PinholeRadtan::PinholeRadtan(const CameraIntrinsics& intrinsics)
   valid_radius2_ = square(std::tan(valid_angle_));
 }
 
-double PinholeRadtan::focal_px() const {
-  return std::sqrt(fx_ * fy_);
-}
+double PinholeRadtan::focal_px() const { return std::sqrt(fx_ * fy_); }
 
 // In polar coordinates the potential is F(r) + r^3 |p| cos(a), p = (p2, p1), a the angle between m and p. Its
 // Hessian there is [F'' + 6 r|p| cos a, -2 r|p| sin a; ., F'/r + 2 r|p| cos a]: the determinant is a parabola

@@ -129,6 +129,14 @@ function band(name, bound, both, ink) {
 
 const largest = (series) => series.y.reduce((m, v) => Math.max(m, Math.abs(v)), 0);
 
+/** Ranges around the paths: the map is drawn as far as it lies there. */
+function aroundPaths(axis) {
+  const values = run.paths.flatMap((p) => p[axis]);
+  const low = values.reduce((a, b) => Math.min(a, b)), high = values.reduce((a, b) => Math.max(a, b));
+  const margin = Math.max(0.5, 0.3 * (high - low));
+  return [low - margin, high + margin];
+}
+
 /** A range that shows the errors in full, and their bounds unless these would make the errors small. */
 function rangeOf(errors, bounds, both) {
   const error = Math.max(...errors.map(largest));
@@ -172,7 +180,7 @@ function topView() {
   }
   const first = run.paths[run.paths.length - 1];
   data.push({ type: "scatter", mode: "markers", name: "start", x: [first.x[0]], y: [first.y[0]], marker: { size: 9, symbol: "circle-open", line: { width: 2 }, color: colour("ink") }, hoverinfo: "skip" });
-  return { data, layout: layout({ xaxis: axis("x [m]"), yaxis: axis("y [m]", { scaleanchor: "x" }), hovermode: "closest" }) };
+  return { data, layout: layout({ xaxis: axis("x [m]", { range: aroundPaths("x") }), yaxis: axis("y [m]", { range: aroundPaths("y"), scaleanchor: "x" }), hovermode: "closest" }) };
 }
 
 const errorOverTime = (series, bound, unit) => () => {

@@ -11,7 +11,7 @@ namespace evpose {
 namespace {
 
 using Colour = std::array<std::uint8_t, 3>;
-constexpr Colour kOn{214, 56, 46}, kOff{38, 102, 214}, kMatched{0, 148, 68}, kUnmatched{150, 150, 150};
+constexpr Colour kOn{214, 56, 46}, kOff{38, 102, 214}, kMatched{0, 150, 60}, kUnmatched{175, 175, 175};
 
 void blend(std::uint8_t* pixel, const Colour& ink, float share) {
   for (std::size_t c = 0; c < 3; ++c) {
@@ -20,17 +20,19 @@ void blend(std::uint8_t* pixel, const Colour& ink, float share) {
   }
 }
 
-void draw_cross(RgbImage* image, const OverlayPoint& point) {
+/// A cross for a matched point, a dot for another.
+void draw_point(RgbImage* image, const OverlayPoint& point) {
   // Written so that NaN fails as well.
   if (!(point.x > -0.5f && point.y > -0.5f && point.x < static_cast<float>(image->width) - 0.5f &&
         point.y < static_cast<float>(image->height) - 0.5f))
     return;
   const int x = static_cast<int>(std::lround(point.x)), y = static_cast<int>(std::lround(point.y));
+  if (!point.matched) return blend(image->pixel(x, y), kUnmatched, 1);
   constexpr int kArms[5][2] = {{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}};
   for (const auto& [dx, dy] : kArms) {
     const int u = x + dx, v = y + dy;
     if (u < 0 || v < 0 || u >= image->width || v >= image->height) continue;
-    blend(image->pixel(u, v), point.matched ? kMatched : kUnmatched, dx == 0 && dy == 0 ? 1.0f : 0.6f);
+    blend(image->pixel(u, v), kMatched, dx == 0 && dy == 0 ? 1.0f : 0.75f);
   }
 }
 
@@ -46,7 +48,7 @@ RgbImage draw_overlay(int width, int height, std::span<const float> decay,
   }
   for (const bool matched : {false, true})  // matched ones on top
     for (const OverlayPoint& p : points)
-      if (p.matched == matched) draw_cross(&image, p);
+      if (p.matched == matched) draw_point(&image, p);
   return image;
 }
 

@@ -26,7 +26,6 @@ struct RunPage {
   const StateLog& log;
   const RunSummary& summary;
   const ConfigTable& config;
-  std::span<const TimedPose> truth;  ///< beside the run
   const std::optional<TrajectoryScore>& score;
   std::span<const OverlayPicture> overlays;
 };

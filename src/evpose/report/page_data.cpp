@@ -25,6 +25,12 @@ std::string format(const char* pattern, auto... values) {
   return out;
 }
 
+/// With three significant digits, zeros kept.
+std::string three_digits(double value) {
+  const double magnitude = std::abs(value) > 0 ? std::floor(std::log10(std::abs(value))) : 0;
+  return format("%.*f", static_cast<int>(std::clamp(2 - magnitude, 0.0, 6.0)), value);
+}
+
 Json numbers(const std::vector<double>& values, int digits) {
   Json out = Json::array();
   for (const double v : values) out.push_back(rounded(v, digits));
@@ -205,9 +211,9 @@ Json tile(const std::string& label, const std::string& value, const std::string&
 
 void add_score_tiles(const TrajectoryScore& score, Json* tiles) {
   if (score.pairs > 0) {
-    tiles->push_back(tile("Position error, mean", format("%.3g", score.ate_mm.mean), "mm",
+    tiles->push_back(tile("Position error, mean", three_digits(score.ate_mm.mean), "mm",
                           format("rmse %.3g, largest %.3g mm", score.ate_mm.rmse, score.ate_mm.max)));
-    tiles->push_back(tile("Rotation error, mean", format("%.3g", score.are_deg.mean), "deg",
+    tiles->push_back(tile("Rotation error, mean", three_digits(score.are_deg.mean), "deg",
                           format("rmse %.3g, largest %.3g deg", score.are_deg.rmse, score.are_deg.max)));
   }
   tiles->push_back(tile("Coverage", format("%.1f", std::floor(1000 * score.coverage) / 10), "%",
@@ -226,7 +232,7 @@ void add_score_tiles(const TrajectoryScore& score, Json* tiles) {
     tiles->push_back(tile("NEES / 6", format("%.2f", *score.nees6_mean), "",
                           format("1 is ideal; %.0f %% in the 95 %% band", 100 * *score.nees6_in_band)));
   if (score.over_100ms)
-    tiles->push_back(tile("Drift over 100 ms", format("%.3g", score.over_100ms->translation_mm), "mm",
+    tiles->push_back(tile("Drift over 100 ms", three_digits(score.over_100ms->translation_mm), "mm",
                           format("%.3g deg", score.over_100ms->rotation_deg)));
 }
 
@@ -236,7 +242,7 @@ void add_run_tiles(const StateLog& log, const RunSummary& summary, Json* tiles) 
                           format("median; p99 %.2f ms", latency->update.p99_ms)));
   const double million = 1e-6 * static_cast<double>(summary.events_read);
   if (summary.wall_s > 0)
-    tiles->push_back(tile("Events", format("%.3g", million), "million",
+    tiles->push_back(tile("Events", three_digits(million), "million",
                           format("%.3g million / s processed", million / summary.wall_s)));
   if (log.rows.size() < 2) return;
   const double data_s = to_seconds(log.rows.back().t - log.rows.front().t);
@@ -306,8 +312,11 @@ std::string run_page(const RunPage& run) {
   for (const StateRow& row : log.rows)
     if (row.valid()) estimate.push_back({row.t, row.T_map_body});
   const TimeNs origin = !log.rows.empty() ? log.rows.front().t : 0;
-  add_paths(estimate, run.truth, origin, &data);
-  if (const auto near = points_near(run.summary.map_points, estimate, run.truth); !near.empty())
+  std::vector<TimedPose> truth;  // as far as the run goes
+  for (const TimedPose& p : run.summary.truth)
+    if (!log.rows.empty() && p.t >= log.rows.front().t && p.t <= log.rows.back().t) truth.push_back(p);
+  add_paths(estimate, truth, origin, &data);
+  if (const auto near = points_near(run.summary.map_points, estimate, truth); !near.empty())
     data["map"] = columns(spread_indices(near.size(), kMapPoints), 6, [&](std::size_t i) { return near[i]; });
   if (run.score) add_errors(*run.score, origin, &data);
   if (!log.rows.empty()) {

@@ -44,17 +44,8 @@ Status check_place(const fs::path& place) {
   return {};
 }
 
-/// The ground truth as far as the run goes: outside it there was nothing to track.
-std::vector<TimedPose> truth_beside(const StateLog& log, const std::vector<TimedPose>& truth) {
-  std::vector<TimedPose> out;
-  if (log.rows.empty()) return out;
-  for (const TimedPose& p : truth)
-    if (p.t >= log.rows.front().t && p.t <= log.rows.back().t) out.push_back(p);
-  return out;
-}
-
 std::optional<TrajectoryScore> score_run(const StateLog& log, const std::vector<TimedPose>& truth) {
-  if (truth.size() < 2) return std::nullopt;
+  if (truth.size() < 2 || log.rows.empty()) return std::nullopt;
   std::vector<TimedPose> estimate;
   std::vector<Matrix6d> covariances;
   std::vector<Eigen::Vector3d> velocities;
@@ -64,7 +55,11 @@ std::optional<TrajectoryScore> score_run(const StateLog& log, const std::vector<
     covariances.push_back(row.covariance_matrix());
     velocities.push_back(row.velocity);
   }
-  return score_trajectory({estimate, truth, covariances, velocities, {}}, {});
+  // Outside the run there was nothing to track.
+  ScoreOptions options;
+  options.from = log.rows.front().t;
+  options.to = log.rows.back().t;
+  return score_trajectory({estimate, truth, covariances, velocities, {}}, options);
 }
 
 }  // namespace
@@ -167,8 +162,7 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
   State& s = *state_;
   RunOutcome out;
   if (!s.log.rows.empty()) out.health = s.log.rows.back().health;
-  const std::vector<TimedPose> truth = truth_beside(s.log, summary.truth);
-  out.score = score_run(s.log, truth);
+  out.score = score_run(s.log, summary.truth);
   out.text = summary_text(s.log, summary, out.score);
   out.report = (s.place / "report.html").string();
 
@@ -181,7 +175,7 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
   if (Status done = write("config.yaml", config.to_yaml()); !done) return done.error();
   if (Status done = write("summary.json", summary_json(s.log, summary, config, out.score)); !done)
     return done.error();
-  const std::string page = run_page({s.log, summary, config, truth, out.score, s.overlays});
+  const std::string page = run_page({s.log, summary, config, out.score, s.overlays});
   if (Status done = write("report.html", page); !done) return done.error();
   if (Status done = s.move_into_place(); !done) return done.error();
   return out;

@@ -49,9 +49,9 @@ Hdf5Handle space_of(const Hdf5Shape& shape) {
   return own(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), H5Sclose);
 }
 
-Hdf5Handle text_type() {
+Hdf5Handle text_type(std::size_t size) {
   auto type = own(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(type.get(), H5T_VARIABLE);
+  H5Tset_size(type.get(), size);
   H5Tset_cset(type.get(), H5T_CSET_UTF8);
   return type;
 }
@@ -68,7 +68,7 @@ hssize_t items_of(const Hdf5Handle& attribute) {
 }
 
 std::optional<std::vector<std::string>> read_variable_strings(const Hdf5Handle& attribute, hssize_t items) {
-  const auto type = text_type();
+  const auto type = text_type(H5T_VARIABLE);
   const auto stored = own(H5Aget_type(attribute.get()), H5Tclose);
   H5Tset_cset(type.get(), H5Tget_cset(stored.get()));
   std::vector<char*> pointers(static_cast<std::size_t>(items), nullptr);
@@ -95,6 +95,21 @@ std::optional<std::vector<std::string>> read_fixed_strings(const Hdf5Handle& att
     out.push_back(std::move(value));
   }
   return out;
+}
+
+/// Texts of fixed length: the library follows those of variable length into a heap that has no checksum.
+bool write_texts(hid_t file, const std::string& object, const std::string& name, const Hdf5Shape& shape,
+                 const std::vector<std::string>& values) {
+  std::size_t width = 1;
+  for (const auto& v : values) width = std::max(width, v.size() + 1);
+  std::string buffer;
+  for (const auto& v : values) buffer += v + std::string(width - v.size(), '\0');
+  const auto type = text_type(width);
+  const auto space = space_of(shape);
+  const auto attribute = own(H5Acreate_by_name(file, object.c_str(), name.c_str(), type.get(), space.get(),
+                                               H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                             H5Aclose);
+  return attribute && (values.empty() || H5Awrite(attribute.get(), type.get(), buffer.data()) >= 0);
 }
 
 }  // namespace
@@ -199,28 +214,13 @@ Status Hdf5File::set_attribute(const std::string& object, const std::string& nam
 }
 
 Status Hdf5File::set_attribute(const std::string& object, const std::string& name, const std::string& value) {
-  const auto type = text_type();
-  const auto space = space_of({});
-  const auto attribute = own(H5Acreate_by_name(id_.get(), object.c_str(), name.c_str(), type.get(),
-                                               space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                             H5Aclose);
-  const char* pointer = value.c_str();
-  if (!attribute || H5Awrite(attribute.get(), type.get(), static_cast<const void*>(&pointer)) < 0)
-    return failed("cannot write attribute " + name);
+  if (!write_texts(id_.get(), object, name, {}, {value})) return failed("cannot write attribute " + name);
   return {};
 }
 
 Status Hdf5File::set_attribute(const std::string& object, const std::string& name,
                                const std::vector<std::string>& values) {
-  const auto type = text_type();
-  const auto space = space_of({values.size()});
-  const auto attribute = own(H5Acreate_by_name(id_.get(), object.c_str(), name.c_str(), type.get(),
-                                               space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                             H5Aclose);
-  std::vector<const char*> pointers;
-  for (const auto& v : values) pointers.push_back(v.c_str());
-  if (!attribute || (!values.empty() &&
-                     H5Awrite(attribute.get(), type.get(), static_cast<const void*>(pointers.data())) < 0))
+  if (!write_texts(id_.get(), object, name, {values.size()}, values))
     return failed("cannot write attribute " + name);
   return {};
 }

@@ -4,6 +4,7 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -154,7 +155,9 @@ Expected<Hdf5File> Hdf5File::create(const TemporaryFile& temporary) {
   silence();
   Hdf5File file;
   file.path_ = temporary.target();
-  file.id_ = own(H5Fcreate(temporary.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  const auto access = own(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
+  file.id_ = own(H5Fcreate(temporary.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose);
   if (!file.id_) return file.failed("cannot be written");
   return file;
 }
@@ -229,7 +232,7 @@ Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions)
   // Deflate makes at most 1032 bytes of one; anything beyond is a damaged header, or content that was never
   // written.
   double bytes = static_cast<double>(H5Tget_size(type.get()));
-  const double most = 1100.0 * static_cast<double>(size_);
+  const double most = size_ > 0 ? 1100.0 * static_cast<double>(size_) : std::numeric_limits<double>::max();
   if (chunk_bytes(properties.get(), static_cast<std::size_t>(bytes)) > std::min(most, 1e9))
     return Error{where, "has larger chunks than the file can hold", "the file is damaged; copy it again"};
   for (const auto n : out.shape_) bytes *= static_cast<double>(n);

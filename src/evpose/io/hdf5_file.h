@@ -65,12 +65,12 @@ class Hdf5File {
  public:
   /// Errors: no such file, no HDF5, truncated.
   static Expected<Hdf5File> open(const std::string& path);
-  /// Writes to the temporary file, whose target errors name. Superblock and types as HDF5 1.8 and later read
-  /// them; no time stamps, so that same content gives same bytes.
+  /// Writes to the temporary file, whose target errors name. In the format of HDF5 1.10, whose structure
+  /// carries checksums of its own; no time stamps, so that same content gives same bytes.
   static Expected<Hdf5File> create(const TemporaryFile& temporary);
 
   const std::string& path() const { return path_; }
-  std::int64_t size() const { return size_; }  ///< bytes of the file when opened
+  std::int64_t size() const { return size_; }  ///< bytes of the file when opened; 0 when created
 
   bool has(const std::string& object) const;
   std::vector<std::string> root_groups() const;                          ///< sorted by name
@@ -89,7 +89,7 @@ class Hdf5File {
   Status make_group(const std::string& name);
   /// Chunks of `chunk_rows` rows with shuffle and deflate level 4; the first dimension can grow.
   Expected<Hdf5Handle> make_dataset(const std::string& name, NumberType type, const Hdf5Shape& shape,
-                                    std::uint64_t chunk_rows = 65536);
+                                    std::uint64_t chunk_rows);
   Status append(const Hdf5Handle& dataset, NumberType type, std::uint64_t rows_before, std::uint64_t rows,
                 const void* data);
   /// On a group or dataset; `shape` empty for a scalar.

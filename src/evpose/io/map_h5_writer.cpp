@@ -13,6 +13,8 @@
 namespace evpose {
 namespace {
 
+constexpr std::uint64_t kChunkRows = 65536;  // fewer for a smaller map: readers hold a chunk in memory
+
 /// Columns of /contours and /points as they will stand in the file.
 struct Columns {
   std::vector<std::uint64_t> start;
@@ -87,7 +89,7 @@ class Writer {
     EVPOSE_CHECK(size_of(type) == sizeof(T) && values.size() % width == 0);
     const std::uint64_t rows = values.size() / width;
     const Hdf5Shape shape = width == 1 ? Hdf5Shape{rows} : Hdf5Shape{rows, width};
-    auto made = file_.make_dataset(name, type, shape);
+    auto made = file_.make_dataset(name, type, shape, std::clamp<std::uint64_t>(rows, 1, kChunkRows));
     if (!made) return made.error();
     if (auto status = file_.append(*made, type, 0, rows, values.data()); !status) return status;
     const std::uint32_t crc = crc32(values.data(), values.size() * sizeof(T));

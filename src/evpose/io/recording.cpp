@@ -216,10 +216,10 @@ Expected<Recording> open_recording(const std::string& folder) {
   if (auto status = take_groundtruth(overrides, yaml, r); !status) return status.error();
   take_options(overrides, timeshift_s, r);
   if (auto status = probe_events(r); !status) return status.error();
+  if (auto status = crop(yaml, r); !status) return status.error();
   if (r.has_imu) {
     if (auto status = check_imu(overrides, r); !status) return status.error();
   }
-  if (auto status = crop(yaml, r); !status) return status.error();
   return r;
 }
 

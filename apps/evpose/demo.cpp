@@ -13,7 +13,8 @@ namespace evpose {
 namespace {
 
 int demo(const std::string& folder, const sim::DemoOptions& options) {
-  std::printf("Making a %.0f s recording of a flight through a furnished room (about a minute) ...\n", options.duration_s);
+  std::printf("Making a %.0f s recording of a flight through a furnished room (about a minute) ...\n",
+              options.duration_s);
   std::fflush(stdout);
   const std::string recording = folder + "/recording";
   {
@@ -33,7 +34,8 @@ int demo(const std::string& folder, const sim::DemoOptions& options) {
 }  // namespace
 
 void add_demo(CLI::App& app, std::function<int()>& run) {
-  auto* command = app.add_subcommand("demo", "Make a small recording, track it, report: the two-minute proof");
+  auto* command =
+      app.add_subcommand("demo", "Make a small recording, track it, report: the two-minute proof");
   struct Options {
     std::string folder = "evpose-demo";
     sim::DemoOptions sim;
@@ -41,7 +43,9 @@ void add_demo(CLI::App& app, std::function<int()>& run) {
   auto o = std::make_shared<Options>();
   o->sim.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   command->add_option("-o,--output", o->folder, "folder for recording and run")->capture_default_str();
-  command->add_option("--seconds", o->sim.duration_s, "length of the recording")->capture_default_str()->check(CLI::Range(0.5, 10.0));
+  command->add_option("--seconds", o->sim.duration_s, "length of the recording")
+      ->capture_default_str()
+      ->check(CLI::Range(0.5, 10.0));
   command->add_option("--seed", o->sim.seed, "of texture, motion and noise")->capture_default_str();
   command->callback([o, &run] { run = [o] { return demo(o->folder, o->sim); }; });
 }

@@ -13,7 +13,9 @@ int main(int argc, char** argv) {
   CLI::App app{"evpose: where the drone is, from events, IMU and a prior 3D map"};
   app.set_version_flag("--version", std::string("evpose ") + version());
   app.require_subcommand(1);
-  app.footer("Exit status: 0 done; 1 ran, but the tracker was lost at the end or a check failed; 2 bad input or usage.");
+  app.footer(
+      "Exit status: 0 done; 1 ran, but the tracker was lost at the end or a check failed; 2 bad input or "
+      "usage.");
   bool verbose = false, quiet = false;
   app.add_flag("-v,--verbose", verbose, "say more");
   app.add_flag("-q,--quiet", quiet, "warnings and progress off");

@@ -37,9 +37,12 @@ int print_map(const std::string& path) {
     if (p.contour >= 0) contours.insert(p.contour);
   }
   const Eigen::Vector3d a = map->anchor + low.cast<double>(), b = map->anchor + high.cast<double>();
-  std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map->points.size(), contours.size(), length_m);
-  std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", a.x(), b.x(), a.y(), b.y(), a.z(), b.z());
-  std::printf("occluders  %zu triangles\nframe      %s\n", map->occluders.triangles.size(), map->frame.c_str());
+  std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map->points.size(), contours.size(),
+              length_m);
+  std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", a.x(), b.x(), a.y(), b.y(),
+              a.z(), b.z());
+  std::printf("occluders  %zu triangles\nframe      %s\n", map->occluders.triangles.size(),
+              map->frame.c_str());
   return 0;
 }
 
@@ -56,10 +59,13 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   import->add_option("contours", o->input, "contours.ply, or any cloud of edge points")->required();
   import->add_option("--occluders", o->occluders, "PLY mesh that hides contours behind it");
   import->add_option("-o,--output", o->output, "map file")->capture_default_str();
-  import->callback([o, &run] { run = [o] { return import_map(o->input, o->occluders, o->output); }; });
-  auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
-  info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
-  info->callback([o, &run] { run = [o] { return print_map(o->input); }; });
+  import->callback([o, &run] { run = [o] { return import_map(o->input, o->occluders, o->output);
+};
+}  // namespace evpose
+);
+auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
+info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
+info->callback([o, &run] { run = [o] { return print_map(o->input); }; });
 }
 
 }  // namespace evpose

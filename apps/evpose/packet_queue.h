@@ -12,8 +12,8 @@
 
 namespace evpose {
 
-/// Reads packets ahead on a thread of its own, at most `kAhead` of them. What comes out, and in which order, is
-/// what the reader alone would give.
+/// Reads packets ahead on a thread of its own, at most `kAhead` of them. What comes out, and in which order,
+/// is what the reader alone would give.
 class PacketQueue {
  public:
   explicit PacketQueue(EventReader& reader) : reader_(reader), thread_([this] { run(); }) {}

@@ -25,7 +25,8 @@ void Progress::at(double fraction) {
   shown_ = true;
   fraction = std::clamp(fraction, 1e-6, 1.0);
   const double spent_s = std::chrono::duration<double>(now - start_).count();
-  std::fprintf(stderr, "\r%s %3.0f %%, %.0f s left ", what_.c_str(), 100 * fraction, spent_s * (1 - fraction) / fraction);
+  std::fprintf(stderr, "\r%s %3.0f %%, %.0f s left ", what_.c_str(), 100 * fraction,
+               spent_s * (1 - fraction) / fraction);
 }
 
 void Progress::done() {

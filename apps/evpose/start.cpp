@@ -10,9 +10,9 @@
 namespace evpose {
 namespace {
 
-constexpr double kUnknownSpeed_m_s = 0.5;      // of a start pose given without velocity
+constexpr double kUnknownSpeed_m_s = 0.5;  // of a start pose given without velocity
 constexpr double kUnknownRate_rad_s = 0.5;
-constexpr TimeNs kDifference = 5 * kNsPerMs;   // velocity from poses at least so far to both sides
+constexpr TimeNs kDifference = 5 * kNsPerMs;  // velocity from poses at least so far to both sides
 
 /// First pose of the trajectory inside the recording, velocities from its neighbours.
 Expected<StartState> from_trajectory(const std::vector<TimedPose>& poses, const Recording& recording,
@@ -20,7 +20,8 @@ Expected<StartState> from_trajectory(const std::vector<TimedPose>& poses, const 
   const auto before = [](const TimedPose& p, TimeNs t) { return p.t < t; };
   const auto first = std::lower_bound(poses.begin(), poses.end(), recording.first_ns, before);
   if (first == poses.end() || first->t > recording.last_ns)
-    return Error{where, "no pose inside the recording's events", "check the clocks (time.offset_groundtruth_s), or give a pose with --init"};
+    return Error{where, "no pose inside the recording's events",
+                 "check the clocks (time.offset_groundtruth_s), or give a pose with --init"};
   auto a = first, b = first;
   while (a != poses.begin() && first->t - a->t < kDifference) --a;
   while (b + 1 != poses.end() && b->t - first->t < kDifference) ++b;
@@ -66,12 +67,14 @@ Expected<StartState> from_text(const std::string& text_in, const Recording& reco
 
 void widen(const Recording& recording, EkfConfig* config) {
   if (recording.initial_pose) {
-    config->start_position_sigma_m = std::max(config->start_position_sigma_m, recording.initial_pose->sigma_p_m);
+    config->start_position_sigma_m =
+        std::max(config->start_position_sigma_m, recording.initial_pose->sigma_p_m);
     config->start_rotation_sigma_rad =
         std::max(config->start_rotation_sigma_rad, recording.initial_pose->sigma_q_deg * M_PI / 180);
   }
   config->start_velocity_sigma_m_s = std::max(config->start_velocity_sigma_m_s, kUnknownSpeed_m_s);
-  config->start_angular_rate_sigma_rad_s = std::max(config->start_angular_rate_sigma_rad_s, kUnknownRate_rad_s);
+  config->start_angular_rate_sigma_rad_s =
+      std::max(config->start_angular_rate_sigma_rad_s, kUnknownRate_rad_s);
 }
 
 }  // namespace
@@ -80,12 +83,14 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
                                   const std::vector<TimedPose>& truth, EkfConfig* config) {
   if (init == "groundtruth" || (init == "auto" && !truth.empty())) {
     if (truth.empty())
-      return Error{"--init groundtruth", "the recording has no ground truth", "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
+      return Error{"--init groundtruth", "the recording has no ground truth",
+                   "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
     return from_trajectory(truth, recording, recording.groundtruth_path);
   }
   if (init == "auto") {
     if (!recording.initial_pose)
-      return Error{"--init", "the recording has neither ground truth nor initial_pose", "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
+      return Error{"--init", "the recording has neither ground truth nor initial_pose",
+                   "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
     widen(recording, config);
     StartState start;
     start.t = std::max(recording.initial_pose->t, recording.first_ns);
@@ -94,13 +99,16 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
   }
   if (init.find(',') == std::string::npos) {
     const auto poses = read_tum(init);
-    if (!poses) return Error{"--init", poses.error().line(), "give groundtruth, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
+    if (!poses)
+      return Error{"--init", poses.error().line(),
+                   "give groundtruth, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
     return from_trajectory(*poses, recording, init);
   }
   auto start = from_text(init, recording);
   if (!start) return start;
   if (start->t > recording.last_ns)
-    return Error{"--init", "the start lies after the recording's end", "give a time on the recording's clock after @"};
+    return Error{"--init", "the start lies after the recording's end",
+                 "give a time on the recording's clock after @"};
   widen(recording, config);
   return start;
 }

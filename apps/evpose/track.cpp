@@ -30,10 +30,14 @@ void add_track(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand("track", "Track the pose through a recording against a map");
   auto request = std::make_shared<TrackRequest>();
   auto dump = std::make_shared<bool>(false);
-  auto* recording = command->add_option("recording", request->recording, "folder with events, IMU and calibration");
+  auto* recording =
+      command->add_option("recording", request->recording, "folder with events, IMU and calibration");
   command->add_option("--map", request->map, "contours (PLY, PCD, map.h5); default: the recording's own");
-  command->add_option("--occluders", request->occluders, "PLY mesh that hides contours behind it; default: the map's own");
-  command->add_option("--init", request->init, "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file; default: ground truth if there is one, else the recording's initial_pose");
+  command->add_option("--occluders", request->occluders,
+                      "PLY mesh that hides contours behind it; default: the map's own");
+  command->add_option("--init", request->init,
+                      "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file; default: ground truth if "
+                      "there is one, else the recording's initial_pose");
   request->output = "run";
   command->add_option("-o,--output", request->output, "run folder")->capture_default_str();
   command->add_option("--config", request->config_file, "YAML file with settings");

@@ -32,7 +32,9 @@ double wall_s() {
 double cpu_s() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
@@ -42,7 +44,8 @@ double peak_memory_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request, const Recording& recording) {
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
+                                                     const Recording& recording) {
   std::string path = request.map;
   if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
   if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
@@ -100,7 +103,8 @@ Status feed(const Recording& recording, const RunConfig& config, Tracker& tracke
       imu_until = sample.t;
     }
     tracker.add_events(packet);
-    progress.at(to_seconds(end - recording.first_ns) / std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns)));
+    progress.at(to_seconds(end - recording.first_ns) /
+                std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns)));
   }
 }
 
@@ -110,8 +114,8 @@ RunSummary summarise(const Recording& recording, const TrackRequest& request, co
   summary.title = recording.name;
   const auto name = [](const std::string& path) { return path.substr(path.find_last_of('/') + 1); };
   summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",
-                          map.occluders.triangles.empty() ? "" : ", with occluders", "), start: ", request.init,
-                          recording.has_imu ? "" : ", no IMU");
+                          map.occluders.triangles.empty() ? "" : ", with occluders",
+                          "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
   summary.T_body_cam = T_body_cam;
   summary.truth = std::move(truth);
   const std::size_t step = map.points.size() / kDrawnMapPoints + 1;
@@ -120,8 +124,9 @@ RunSummary summarise(const Recording& recording, const TrackRequest& request, co
   summary.events_read = static_cast<std::uint64_t>(counts.read);
   summary.events_kept = static_cast<std::uint64_t>(counts.kept);
   for (const auto& p : tracker.events().filter().hot_pixels()) summary.hot_pixels.emplace_back(p.x, p.y);
-  summary.versions = {{"compiler", __VERSION__},
-                      {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};
+  summary.versions = {
+      {"compiler", __VERSION__},
+      {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};
   return summary;
 }
 
@@ -194,9 +199,11 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   if (auto ok = feed(*recording, *config, **tracker, progress); !ok) return ok.error();
   progress.done();
   if (updates == 0)
-    return Error{request.recording, "the streams end before the first update", "check that events and IMU cover the start"};
+    return Error{request.recording, "the streams end before the first update",
+                 "check that events and IMU cover the start"};
   if (most_points == 0)
-    return Error{(*map)->source, text("none of the map's ", (*map)->points.size(), " points ever comes into view"),
+    return Error{(*map)->source,
+                 text("none of the map's ", (*map)->points.size(), " points ever comes into view"),
                  "check the map's frame, the start pose and the extrinsics T_cam_imu"};
 
   RunSummary summary = summarise(*recording, request, **map, **tracker, std::move(truth), setup.T_body_cam);

@@ -10,7 +10,8 @@ namespace {
 
 std::string format(double value) {
   char buffer[40];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;  // shortest that reads back the same
+  const auto end =
+      std::to_chars(buffer, buffer + sizeof buffer, value).ptr;  // shortest that reads back the same
   return {buffer, end};
 }
 

@@ -11,8 +11,9 @@
 
 namespace evpose {
 
-/// The named, documented, bounded values of one or more config structs. Defaults live in the structs; a module
-/// offers `void describe(ConfigTable&, ItsConfig&)`. The table keeps references: it must not outlive the structs.
+/// The named, documented, bounded values of one or more config structs. Defaults live in the structs; a
+/// module offers `void describe(ConfigTable&, ItsConfig&)`. The table keeps references: it must not outlive
+/// the structs.
 class ConfigTable {
  public:
   struct Bounds {
@@ -23,8 +24,10 @@ class ConfigTable {
   using Choices = std::vector<std::pair<std::string, E>>;
 
   /// `unit` is empty for pure numbers. The key is prefixed by the open groups.
-  void add(const std::string& key, double& value, const std::string& unit, const std::string& help, Bounds bounds);
-  void add(const std::string& key, int& value, const std::string& unit, const std::string& help, Bounds bounds);
+  void add(const std::string& key, double& value, const std::string& unit, const std::string& help,
+           Bounds bounds);
+  void add(const std::string& key, int& value, const std::string& unit, const std::string& help,
+           Bounds bounds);
   void add(const std::string& key, bool& value, const std::string& help);
   void add(const std::string& key, std::string& value, const std::string& help);
   template <class E>

@@ -11,8 +11,9 @@
 
 namespace evpose {
 
-/// Runs the chunks of a loop on a fixed set of threads. The chunks depend on the loop alone, never on the number
-/// of threads; a sum made per chunk and added in the order of the chunks is therefore the same for any number.
+/// Runs the chunks of a loop on a fixed set of threads. The chunks depend on the loop alone, never on the
+/// number of threads; a sum made per chunk and added in the order of the chunks is therefore the same for any
+/// number.
 class ThreadPool {
  public:
   /// `threads` >= 1 counts the caller, which works too.
@@ -23,8 +24,9 @@ class ThreadPool {
 
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
-  /// Calls body(chunk, begin, end) for each chunk of at most `chunk_size` of the indices 0 .. count-1, each once,
-  /// in any order; returns when all are done. Not reentrant. The first exception of a body is thrown again here.
+  /// Calls body(chunk, begin, end) for each chunk of at most `chunk_size` of the indices 0 .. count-1, each
+  /// once, in any order; returns when all are done. Not reentrant. The first exception of a body is thrown
+  /// again here.
   void for_chunks(std::size_t count, std::size_t chunk_size,
                   const std::function<void(std::size_t chunk, std::size_t begin, std::size_t end)>& body);
 

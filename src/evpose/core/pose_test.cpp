@@ -43,9 +43,9 @@ TEST_F(PoseLaws, RightJacobianMatchesDifferences) {
     for (int k = 0; k < 3; ++k) {
       const double h = 1e-6;
       const Eigen::Vector3d d = h * Eigen::Vector3d::Unit(k);
-      const Eigen::Vector3d column =
-          (so3::log(so3::exp(phi).conjugate() * so3::exp(phi + d)) -
-           so3::log(so3::exp(phi).conjugate() * so3::exp(phi - d))) / (2 * h);
+      const Eigen::Vector3d column = (so3::log(so3::exp(phi).conjugate() * so3::exp(phi + d)) -
+                                      so3::log(so3::exp(phi).conjugate() * so3::exp(phi - d))) /
+                                     (2 * h);
       EXPECT_LT((column - jacobian.col(k)).norm(), 1e-8);
     }
     EXPECT_LT((jacobian * so3::right_jacobian_inverse(phi) - Eigen::Matrix3d::Identity()).norm(), 1e-9);
@@ -74,7 +74,9 @@ TEST_F(PoseLaws, PlusRotatesInTheBodyAndTranslatesInTheMap) {
   const Pose moved = a.plus(d);
   EXPECT_LT((moved.p - a.p - Eigen::Vector3d::UnitX()).norm(), 1e-12);
   EXPECT_LT((a.q.conjugate() * moved.q * Eigen::Vector3d::UnitX() -
-             Eigen::Vector3d(std::cos(0.1), std::sin(0.1), 0)).norm(), 1e-12);
+             Eigen::Vector3d(std::cos(0.1), std::sin(0.1), 0))
+                .norm(),
+            1e-12);
 }
 
 TEST_F(PoseLaws, InterpolationMeetsItsEndsAndTheMiddleOfAScrew) {

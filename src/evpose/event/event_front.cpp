@@ -13,7 +13,8 @@ constexpr double kShortestBurst_s = 1e-3;
 
 void describe(ConfigTable& table, EventFrontConfig& c) {
   table.group("filter", c.filter);
-  table.add("burst_px", c.burst_px, "px", "quiet time, as predicted motion, that ends a pixel's burst", {0.01, 100});
+  table.add("burst_px", c.burst_px, "px", "quiet time, as predicted motion, that ends a pixel's burst",
+            {0.01, 100});
 }
 
 EventFront::EventFront(int width, int height, const EventFrontConfig& config)

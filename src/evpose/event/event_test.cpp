@@ -77,8 +77,8 @@ TEST(NoiseFilter, MasksThePixelThatFiresAlone) {
   std::uint32_t t = 1;
   for (int i = 0; i < 1000; ++i) {
     t += 1500;
-    filter.keep(20, 20, true, t);                                     // 667 Hz, alone
-    if (i % 100 == 0) filter.keep(1 + i / 100, 5, true, t);          // a slow edge
+    filter.keep(20, 20, true, t);                            // 667 Hz, alone
+    if (i % 100 == 0) filter.keep(1 + i / 100, 5, true, t);  // a slow edge
   }
   ASSERT_EQ(filter.hot_pixels().size(), 1u);
   EXPECT_EQ(filter.hot_pixels()[0].x, 20);

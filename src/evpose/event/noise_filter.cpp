@@ -10,13 +10,15 @@ namespace evpose {
 
 void describe(ConfigTable& table, NoiseFilterConfig& c) {
   table.add("on", c.on, "drop events without a recent event among their 8 neighbours");
-  table.add("support_px", c.support_px, "px", "a neighbour's event supports for this much predicted motion", {0.01, 100});
+  table.add("support_px", c.support_px, "px", "a neighbour's event supports for this much predicted motion",
+            {0.01, 100});
   table.add("support_min_s", c.support_min_s, "s", "shortest support window", {1e-5, 10});
   table.add("support_max_s", c.support_max_s, "s", "longest support window", {1e-5, 10});
   table.add("same_polarity", c.same_polarity, "only events of the same polarity support each other");
-  table.add("hot_factor", c.hot_factor, "", "unsupported events over the median of active pixels that make a pixel hot",
-            {1, 1e6});
-  table.add("hot_min_events", c.hot_min_events, "1/s", "fewest unsupported events of a hot pixel", {1, 60000});
+  table.add("hot_factor", c.hot_factor, "",
+            "unsupported events over the median of active pixels that make a pixel hot", {1, 1e6});
+  table.add("hot_min_events", c.hot_min_events, "1/s", "fewest unsupported events of a hot pixel",
+            {1, 60000});
 }
 
 NoiseFilter::NoiseFilter(int width, int height, const NoiseFilterConfig& config)

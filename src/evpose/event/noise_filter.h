@@ -12,17 +12,17 @@ class ConfigTable;
 
 struct NoiseFilterConfig {
   bool on = true;
-  double support_px = 1.0;        ///< a neighbour's event supports for this much predicted motion, px
-  double support_min_s = 2e-3;    ///< ... but at least this long
-  double support_max_s = 30e-3;   ///< ... and at most
-  bool same_polarity = false;     ///< support only by events of the same polarity
-  double hot_factor = 20;         ///< a pixel with more unsupported events than this times the median is hot
-  int hot_min_events = 20;        ///< ... if it had at least so many within the second
+  double support_px = 1.0;       ///< a neighbour's event supports for this much predicted motion, px
+  double support_min_s = 2e-3;   ///< ... but at least this long
+  double support_max_s = 30e-3;  ///< ... and at most
+  bool same_polarity = false;    ///< support only by events of the same polarity
+  double hot_factor = 20;        ///< a pixel with more unsupported events than this times the median is hot
+  int hot_min_events = 20;       ///< ... if it had at least so many within the second
 };
 void describe(ConfigTable& table, NoiseFilterConfig& config);
 
-/// Spatio-temporal consistency (EV-Pose 4.1): an event is kept if the newest event among its eight neighbours is
-/// at most `support` old. Pixels that fire on without such support are found once a second and masked.
+/// Spatio-temporal consistency (EV-Pose 4.1): an event is kept if the newest event among its eight neighbours
+/// is at most `support` old. Pixels that fire on without such support are found once a second and masked.
 class NoiseFilter {
  public:
   NoiseFilter(int width, int height, const NoiseFilterConfig& config);
@@ -71,7 +71,7 @@ class NoiseFilter {
   std::size_t stride_;
   std::uint32_t support_us_;
   std::uint32_t second_end_us_ = 0;
-  std::vector<std::uint32_t> last_, last_on_;      ///< with a border of one pixel; last_on_ only if same_polarity
+  std::vector<std::uint32_t> last_, last_on_;  ///< with a border of one pixel; last_on_ only if same_polarity
   std::vector<std::uint16_t> seen_, unsupported_;  ///< this second, per pixel
   std::vector<std::uint8_t> masked_;
   std::vector<Pixel> hot_;

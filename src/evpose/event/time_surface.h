@@ -49,9 +49,9 @@ void rebase_stamps(std::vector<std::uint32_t>& stamps, std::uint32_t shift);
 
 enum class Polarity : std::uint8_t { off = 0, on = 1 };
 
-/// Separated-polarity time surface (EV-Pose 4.1): per polarity and pixel, the time of the last event and of the
-/// first event of its burst. T(x, t) = exp(-(t - last(x)) / eta) is evaluated only where it is read.
-/// A border of `kBorder` pixels lets readers take small patches around any pixel of the image unchecked.
+/// Separated-polarity time surface (EV-Pose 4.1): per polarity and pixel, the time of the last event and of
+/// the first event of its burst. T(x, t) = exp(-(t - last(x)) / eta) is evaluated only where it is read. A
+/// border of `kBorder` pixels lets readers take small patches around any pixel of the image unchecked.
 class TimeSurface {
  public:
   static constexpr int kBorder = 4;

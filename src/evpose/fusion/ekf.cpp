@@ -21,16 +21,20 @@ void describe(ConfigTable& table, EkfConfig& c) {
   table.add("gravity_y", c.gravity_map.y(), "m/s^2", "gravity in the map frame", {-20, 20});
   table.add("gravity_z", c.gravity_map.z(), "m/s^2", "gravity in the map frame", {-20, 20});
   table.add("imu_noise_scale", c.imu_noise_scale, "", "factor on the IMU's noise densities", {0.01, 1000});
-  table.add("cv_accel_density", c.cv_accel_density, "m/s^2/sqrt(Hz)", "without IMU: white acceleration", {1e-6, 1e6});
-  table.add("cv_angular_density", c.cv_angular_density, "rad/s^2/sqrt(Hz)", "without IMU: white angular acceleration",
+  table.add("cv_accel_density", c.cv_accel_density, "m/s^2/sqrt(Hz)", "without IMU: white acceleration",
             {1e-6, 1e6});
-  table.add("start_position_sigma_m", c.start_position_sigma_m, "m", "error of the start position, 1 sigma", {1e-6, 10});
-  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad", "error of the start attitude, 1 sigma", {1e-6, 1});
-  table.add("start_velocity_sigma_m_s", c.start_velocity_sigma_m_s, "m/s", "error of the start velocity, 1 sigma", {1e-6, 100});
-  table.add("start_gyro_bias_sigma_rad_s", c.start_gyro_bias_sigma_rad_s, "rad/s", "gyroscope bias at the start, 1 sigma",
+  table.add("cv_angular_density", c.cv_angular_density, "rad/s^2/sqrt(Hz)",
+            "without IMU: white angular acceleration", {1e-6, 1e6});
+  table.add("start_position_sigma_m", c.start_position_sigma_m, "m", "error of the start position, 1 sigma",
             {1e-6, 10});
-  table.add("start_accel_bias_sigma_m_s2", c.start_accel_bias_sigma_m_s2, "m/s^2", "accelerometer bias at the start, 1 sigma",
-            {1e-6, 10});
+  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad",
+            "error of the start attitude, 1 sigma", {1e-6, 1});
+  table.add("start_velocity_sigma_m_s", c.start_velocity_sigma_m_s, "m/s",
+            "error of the start velocity, 1 sigma", {1e-6, 100});
+  table.add("start_gyro_bias_sigma_rad_s", c.start_gyro_bias_sigma_rad_s, "rad/s",
+            "gyroscope bias at the start, 1 sigma", {1e-6, 10});
+  table.add("start_accel_bias_sigma_m_s2", c.start_accel_bias_sigma_m_s2, "m/s^2",
+            "accelerometer bias at the start, 1 sigma", {1e-6, 10});
   table.add("start_angular_rate_sigma_rad_s", c.start_angular_rate_sigma_rad_s, "rad/s",
             "without IMU: error of the start's angular rate, 1 sigma", {1e-6, 10});
 }
@@ -38,7 +42,8 @@ void describe(ConfigTable& table, EkfConfig& c) {
 Ekf::Ekf(MotionModel model, const EkfConfig& config, const ImuNoise& noise)
     : model_(model), config_(config), noise_(noise) {
   if (model_ == MotionModel::constant_velocity) {
-    // A gyroscope that reads zero without noise and whose bias walks as the angular rate does; no accelerometer.
+    // A gyroscope that reads zero without noise and whose bias walks as the angular rate does; no
+    // accelerometer.
     config_.imu_noise_scale = 1;
     noise_.gyro_density = 0;
     noise_.gyro_walk = config_.cv_angular_density;
@@ -65,8 +70,8 @@ void Ekf::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_ra
   set(kBa, config_.start_accel_bias_sigma_m_s2);
 }
 
-void Ekf::propagate_covariance(const NavState& before, const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
-                               double dt) {
+void Ekf::propagate_covariance(const NavState& before, const Eigen::Vector3d& rate,
+                               const Eigen::Vector3d& force, double dt) {
   const Eigen::Quaterniond q_mid = before.T_map_body.q * so3::exp(0.5 * dt * rate);
   const Eigen::Matrix3d R = q_mid.toRotationMatrix();
   // The attitude error is in the body of the step's start; seen from its middle it has turned half the way.
@@ -124,7 +129,8 @@ void Ekf::predict(TimeNs t) {
 }
 
 double Ekf::innovation(const PoseInformation& m) const {
-  // z = H^-1 b has covariance P + H^-1, so that NIS = z^T (P + H^-1)^-1 z = b^T (H + H P H)^-1 b on H's range.
+  // z = H^-1 b has covariance P + H^-1, so that NIS = z^T (P + H^-1)^-1 z = b^T (H + H P H)^-1 b on H's
+  // range.
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(m.information);
   const double largest = eigen.eigenvalues().maxCoeff();
   if (!(largest > 0)) return 0;

@@ -18,9 +18,10 @@ enum class MotionModel { imu, constant_velocity };
 
 struct EkfConfig {
   Eigen::Vector3d gravity_map{0, 0, -9.81};  ///< m/s^2
-  double imu_noise_scale = 1.5;       ///< on the densities of imu.yaml: calibrations are made at rest, drones vibrate
-  double cv_accel_density = 3.0;      ///< constant velocity: white acceleration, m/s^2/sqrt(Hz)
-  double cv_angular_density = 6.0;    ///< constant velocity: white angular acceleration, rad/s^2/sqrt(Hz)
+  double imu_noise_scale =
+      1.5;  ///< on the densities of imu.yaml: calibrations are made at rest, drones vibrate
+  double cv_accel_density = 3.0;    ///< constant velocity: white acceleration, m/s^2/sqrt(Hz)
+  double cv_angular_density = 6.0;  ///< constant velocity: white angular acceleration, rad/s^2/sqrt(Hz)
   double start_position_sigma_m = 2e-3;
   double start_rotation_sigma_rad = 2e-3;
   double start_velocity_sigma_m_s = 0.05;
@@ -34,7 +35,8 @@ void describe(ConfigTable& table, EkfConfig& config);
 struct FusionState {
   TimeNs t = 0;
   NavState nav;
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< rad/s; constant velocity: minus the body's angular rate
+  Eigen::Vector3d gyro_bias =
+      Eigen::Vector3d::Zero();  ///< rad/s; constant velocity: minus the body's angular rate
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< m/s^2; unused under constant velocity
   Matrix15d covariance = Matrix15d::Zero();
 
@@ -48,9 +50,9 @@ struct PoseInformation {
   Vector6d vector = Vector6d::Zero();
 };
 
-/// Error-state Kalman filter on T_map_body, velocity and IMU biases: the fusion of prediction (EV-Pose eq. 2, 4)
-/// and pose measurement (eq. 3, 5) for one newest state.
-/// Without an IMU the same filter runs on a gyroscope that reads zero: its "bias" is then minus the angular rate.
+/// Error-state Kalman filter on T_map_body, velocity and IMU biases: the fusion of prediction (EV-Pose eq. 2,
+/// 4) and pose measurement (eq. 3, 5) for one newest state. Without an IMU the same filter runs on a
+/// gyroscope that reads zero: its "bias" is then minus the angular rate.
 class Ekf {
  public:
   Ekf(MotionModel model, const EkfConfig& config, const ImuNoise& noise);
@@ -68,8 +70,8 @@ class Ekf {
   /// Angular rate of the body, rad/s: of the last prediction step.
   const Eigen::Vector3d& angular_rate() const { return angular_rate_; }
 
-  /// Normalised innovation squared of the measurement, divided by its rank: about 1 when state and measurement
-  /// both know how good they are.
+  /// Normalised innovation squared of the measurement, divided by its rank: about 1 when state and
+  /// measurement both know how good they are.
   double innovation(const PoseInformation& measurement) const;
 
   /// Measurement relative to state().nav.T_map_body, as registration returns it.

@@ -77,7 +77,9 @@ TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
   }
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  const auto draw = [&](double s) { return Eigen::Vector3d(s * normal(random), s * normal(random), s * normal(random)); };
+  const auto draw = [&](double s) {
+    return Eigen::Vector3d(s * normal(random), s * normal(random), s * normal(random));
+  };
   double nees = 0;
   const Matrix15d P = ekf.state().covariance;
   const Eigen::LDLT<Eigen::Matrix<double, 9, 9>> solver(P.topLeftCorner<9, 9>());
@@ -87,7 +89,8 @@ TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
     d << draw(config.start_position_sigma_m), draw(config.start_rotation_sigma_rad);
     s.T_map_body = s.T_map_body.plus(d);
     s.velocity += draw(config.start_velocity_sigma_m_s);
-    const Eigen::Vector3d bg = draw(config.start_gyro_bias_sigma_rad_s), ba = draw(config.start_accel_bias_sigma_m_s2);
+    const Eigen::Vector3d bg = draw(config.start_gyro_bias_sigma_rad_s),
+                          ba = draw(config.start_accel_bias_sigma_m_s2);
     const double rate = std::sqrt(1.0 / to_seconds(dt));
     for (int k = 0; k < steps; ++k) {
       ImuSample a = sample(k * dt), b = sample((k + 1) * dt);

@@ -11,8 +11,9 @@ namespace evpose {
 /// One reading, in the body frame (the IMU's own axes).
 struct ImuSample {
   TimeNs t = 0;
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< angular rate, rad/s
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force R^T (a - g), m/s^2; (0, 0, 9.81) at rest, z up
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< angular rate, rad/s
+  Eigen::Vector3d accel =
+      Eigen::Vector3d::Zero();  ///< specific force R^T (a - g), m/s^2; (0, 0, 9.81) at rest, z up
 };
 
 /// Continuous-time densities, as in Kalibr's imu.yaml.

@@ -8,7 +8,8 @@ namespace {
 
 const Eigen::Vector3d kGravity(0, 0, -9.81);
 
-/// A body on a circle of radius 2 m at 1 rad/s, heading along its velocity, which also climbs: known in closed form.
+/// A body on a circle of radius 2 m at 1 rad/s, heading along its velocity, which also climbs: known in
+/// closed form.
 struct Circle {
   static NavState state(double t) {
     NavState s;

@@ -14,15 +14,16 @@ enum class ContourKind : std::uint8_t { unknown = 0, crease = 1, boundary = 2, m
 
 /// A sample of a 3D contour (formats: contours.ply, map.h5).
 struct ContourPoint {
-  Eigen::Vector3f position;                             ///< relative to ContourMap::anchor, metres
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();     ///< unit, in the surface, across the edge, pointing out of it
-  Eigen::Vector3f tangent = Eigen::Vector3f::Zero();    ///< unit, along the contour; never zero in a valid map
-  float length = 0;                                     ///< metres of contour that this point stands for; 0 unknown
-  float sigma = 0;                                      ///< position error across the contour, 1 sigma, metres
-  std::int32_t contour = -1;                            ///< number of the contour, -1: isolated point
-  std::int32_t plane_a = -1, plane_b = -1;              ///< adjacent planes, -1: none
+  Eigen::Vector3f position;  ///< relative to ContourMap::anchor, metres
+  Eigen::Vector3f normal =
+      Eigen::Vector3f::Zero();  ///< unit, in the surface, across the edge, pointing out of it
+  Eigen::Vector3f tangent = Eigen::Vector3f::Zero();  ///< unit, along the contour; never zero in a valid map
+  float length = 0;                         ///< metres of contour that this point stands for; 0 unknown
+  float sigma = 0;                          ///< position error across the contour, 1 sigma, metres
+  std::int32_t contour = -1;                ///< number of the contour, -1: isolated point
+  std::int32_t plane_a = -1, plane_b = -1;  ///< adjacent planes, -1: none
   ContourKind kind = ContourKind::unknown;
-  std::int8_t contrast = 0;                             ///< brightness step when crossing along normal: -1, 0, +1
+  std::int8_t contrast = 0;  ///< brightness step when crossing along normal: -1, 0, +1
 };
 
 /// Surfaces that hide contours behind them. Vertices relative to ContourMap::anchor, metres.
@@ -36,9 +37,9 @@ struct TriangleMesh {
 struct ContourMap {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< map frame, metres
   std::vector<ContourPoint> points;
-  TriangleMesh occluders;      ///< empty: nothing is hidden
-  std::string frame = "map";   ///< name of the map frame
-  std::string source;          ///< file it was read from, for messages
+  TriangleMesh occluders;     ///< empty: nothing is hidden
+  std::string frame = "map";  ///< name of the map frame
+  std::string source;         ///< file it was read from, for messages
 
   Eigen::Vector3d position(std::size_t i) const { return anchor + points[i].position.cast<double>(); }
 };

@@ -27,7 +27,8 @@ void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double ne
   const Eigen::Matrix3f R = T_cam_map.rotation().cast<float>();
   const Eigen::Vector3f offset = (T_cam_map * map.anchor).cast<float>();
   vertices_cam_.resize(map.occluders.vertices.size());
-  for (std::size_t i = 0; i < vertices_cam_.size(); ++i) vertices_cam_[i] = R * map.occluders.vertices[i] + offset;
+  for (std::size_t i = 0; i < vertices_cam_.size(); ++i)
+    vertices_cam_[i] = R * map.occluders.vertices[i] + offset;
   for (const auto& t : map.occluders.triangles) {
     const Eigen::Vector3f corners[3] = {vertices_cam_[t[0]], vertices_cam_[t[1]], vertices_cam_[t[2]]};
     clip_and_draw(corners, static_cast<float>(near_m));
@@ -51,7 +52,8 @@ void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners, float near_m) {
   for (int i = 2; i < n; ++i) draw(kept[0], kept[i - 1], kept[i], normal / distance);
 }
 
-void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope) {
+void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c,
+                       const Eigen::Vector3f& slope) {
   // To grid coordinates (cell centres at whole numbers); 1 / z is linear over the grid.
   for (Eigen::Vector3f* v : {&a, &b, &c}) {
     const float w = 1 / v->z();
@@ -60,7 +62,8 @@ void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, 
   if (a.y() > b.y()) std::swap(a, b);
   if (b.y() > c.y()) std::swap(b, c);
   if (a.y() > b.y()) std::swap(a, b);
-  const float first_row = std::max(std::ceil(a.y()), 0.0F), last_row = std::min(std::floor(c.y()), static_cast<float>(rows_ - 1));
+  const float first_row = std::max(std::ceil(a.y()), 0.0F),
+              last_row = std::min(std::floor(c.y()), static_cast<float>(rows_ - 1));
   for (float y = first_row; y <= last_row; ++y) {
     const auto cross = [y](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
       return p.x() + (q.x() - p.x()) * (y - p.y()) / (q.y() - p.y());
@@ -69,10 +72,12 @@ void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, 
     float right = (y < b.y() || b.y() == c.y()) ? cross(a, b) : cross(b, c);
     if (a.y() == b.y() && y <= b.y()) right = b.x();
     if (left > right) std::swap(left, right);
-    const float x0 = std::max(std::ceil(left), 0.0F), x1 = std::min(std::floor(right), static_cast<float>(columns_ - 1));
+    const float x0 = std::max(std::ceil(left), 0.0F),
+                x1 = std::min(std::floor(right), static_cast<float>(columns_ - 1));
     if (!(x0 <= x1)) continue;
     const float v = (y + 0.5F) * cell_ - tangents_.y(), row_part = slope.y() * v + slope.z();
-    Cell* cell = &cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(x0)];
+    Cell* cell = &cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
+                         static_cast<std::size_t>(x0)];
     for (float x = x0; x <= x1; ++x, ++cell) {
       const float w = slope.x() * ((x + 0.5F) * cell_ - tangents_.x()) + row_part;
       if (w > cell->inverse_depth) *cell = {w, slope};
@@ -87,7 +92,8 @@ bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
   const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
   const auto cell = [&](int c, int r) -> const Cell* {
     if (c < 0 || r < 0 || c >= columns_ || r >= rows_) return nullptr;
-    return &cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
+    return &cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
+                   static_cast<std::size_t>(c)];
   };
   // The four cells around the point are asked at the point itself, those further out for silhouettes.
   for (int r = row - 1; r <= row + 2; ++r)

@@ -9,8 +9,8 @@
 
 namespace evpose {
 
-/// Depth of the nearest surface over a grid of the normalised image plane (x / z, y / z): small, refreshed when
-/// the view has moved, asked for each candidate point (EV-Pose 5.3, "occlusion-aware").
+/// Depth of the nearest surface over a grid of the normalised image plane (x / z, y / z): small, refreshed
+/// when the view has moved, asked for each candidate point (EV-Pose 5.3, "occlusion-aware").
 class DepthBuffer {
  public:
   /// Covers |x / z|, |y / z| <= tangents, with square cells of `cell` (tangent units).
@@ -19,14 +19,15 @@ class DepthBuffer {
   /// Draws the triangles as seen from the camera; those nearer than `near_m` are cut there.
   void render(const ContourMap& map, const Pose& T_map_cam, double near_m);
 
-  /// True if a surface stands before the point. The surface that holds the cell is asked at the point itself, so
-  /// that the edge of a thin board is not hidden by its own faces, and its far edge is. Points beside a much nearer silhouette count as hidden: which of the two an event belongs to is open.
+  /// True if a surface stands before the point. The surface that holds the cell is asked at the point itself,
+  /// so that the edge of a thin board is not hidden by its own faces, and its far edge is. Points beside a
+  /// much nearer silhouette count as hidden: which of the two an event belongs to is open.
   bool hides(const Eigen::Vector3d& point_cam) const;
 
  private:
   /// A surface seen in the grid: at (x / z, y / z) its 1 / z is slope . (x / z, y / z, 1).
   struct Cell {
-    float inverse_depth;      ///< of the nearest surface at the cell's centre, 0: none
+    float inverse_depth;  ///< of the nearest surface at the cell's centre, 0: none
     Eigen::Vector3f slope;
   };
   void draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);

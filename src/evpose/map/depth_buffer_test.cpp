@@ -11,7 +11,8 @@ ContourMap board() {
   ContourMap map;
   map.anchor = {10, 20, 30};
   for (float z : {2.0F, 2.02F})
-    for (const Eigen::Vector2f& c : {Eigen::Vector2f(-0.5F, -0.5F), {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}})
+    for (const Eigen::Vector2f& c :
+         {Eigen::Vector2f(-0.5F, -0.5F), {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}})
       map.occluders.vertices.emplace_back(c.x(), c.y(), z);
   const auto quad = [&](unsigned a, unsigned b, unsigned c, unsigned d) {
     map.occluders.triangles.push_back({a, b, c});

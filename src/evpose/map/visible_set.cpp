@@ -10,13 +10,14 @@
 namespace evpose {
 namespace {
 
-constexpr int kBlockCubes = 8;  // a block is 8 x 8 x 8 cubes
+constexpr int kBlockCubes = 8;       // a block is 8 x 8 x 8 cubes
 constexpr double kDepthCell_px = 2;  // of the occluders' depth buffer
 // Two points are on one contour of the image if their directions and offsets agree this well.
 constexpr float kSameDirectionSin = 0.2F;
 constexpr float kSameLine_px = 0.75F;
 
-/// A fixed random order of the points: choosing by it spreads points without regard to their order in the file.
+/// A fixed random order of the points: choosing by it spreads points without regard to their order in the
+/// file.
 std::uint32_t priority_of(std::uint32_t point) {
   std::uint32_t h = point * 0x9E3779B1u;
   h ^= h >> 15;
@@ -67,13 +68,17 @@ void describe(ConfigTable& table, VisibleSetConfig& c) {
   table.add("near_m", c.near_m, "m", "points nearer than this are left out", {1e-3, 100});
   table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
   table.add("budget", c.budget, "", "most points in all", {6, 100000});
-  table.add("margin_px", c.margin_px, "px", "points may lie this far outside of the image when chosen", {0, 1000});
-  table.add("refresh_px", c.refresh_px, "px", "points are chosen again when the view has moved by this much", {0, 1000});
+  table.add("margin_px", c.margin_px, "px", "points may lie this far outside of the image when chosen",
+            {0, 1000});
+  table.add("refresh_px", c.refresh_px, "px", "points are chosen again when the view has moved by this much",
+            {0, 1000});
   table.add("occlusion", c.occlusion, "leave out points behind the map's occluders, if it has any");
-  table.add("grazing_sin", c.grazing_sin, "", "least sine of the angle between contour and line of sight", {0, 1});
+  table.add("grazing_sin", c.grazing_sin, "", "least sine of the angle between contour and line of sight",
+            {0, 1});
 }
 
-ContourIndex::ContourIndex(const ContourMap& map, double cube_m) : map_(map), cube_m_(static_cast<float>(cube_m)) {
+ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
+    : map_(map), cube_m_(static_cast<float>(cube_m)) {
   const std::size_t n = map.points.size();
   struct Keys {
     std::int64_t block, cube;
@@ -90,7 +95,9 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m) : map_(map), cu
     if (keys[a].cube != keys[b].cube) return keys[a].cube < keys[b].cube;
     return a < b;
   });
-  const auto position = [&](std::uint32_t i) -> const Eigen::Vector3f& { return map_.points[order_[i]].position; };
+  const auto position = [&](std::uint32_t i) -> const Eigen::Vector3f& {
+    return map_.points[order_[i]].position;
+  };
   for (std::uint32_t begin = 0; begin < n;) {
     std::uint32_t block_end = begin;
     while (block_end < n && keys[order_[block_end]].block == keys[order_[begin]].block) ++block_end;
@@ -103,18 +110,20 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m) : map_(map), cu
       cubes_.push_back({s.centre, s.radius, i, end});
       i = end;
     }
-    blocks_.push_back({keys[order_[begin]].block, first_cube, static_cast<std::uint32_t>(cubes_.size()), whole.centre,
-                       whole.radius});
+    blocks_.push_back({keys[order_[begin]].block, first_cube, static_cast<std::uint32_t>(cubes_.size()),
+                       whole.centre, whole.radius});
     begin = block_end;
   }
 }
 
-void ContourIndex::near(const Eigen::Vector3d& centre_map, double radius_m, std::vector<std::uint32_t>& out) const {
+void ContourIndex::near(const Eigen::Vector3d& centre_map, double radius_m,
+                        std::vector<std::uint32_t>& out) const {
   const Eigen::Vector3f centre = (centre_map - map_.anchor).cast<float>();
   const auto radius = static_cast<float>(radius_m);
   // Only the blocks whose keys lie around the sphere are looked up; few enough of them to ask for each.
   const float edge = cube_m_ * kBlockCubes;
-  const Eigen::Vector3f low = ((centre.array() - radius) / edge).floor(), high = ((centre.array() + radius) / edge).floor();
+  const Eigen::Vector3f low = ((centre.array() - radius) / edge).floor(),
+                        high = ((centre.array() + radius) / edge).floor();
   const Eigen::Vector3f count = high - low + Eigen::Vector3f::Ones();
   const auto take = [&](const BlockRange& b) {
     if ((b.centre - centre).norm() > radius + b.radius) return;
@@ -138,7 +147,10 @@ void ContourIndex::near(const Eigen::Vector3d& centre_map, double radius_m, std:
 }
 
 VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config)
-    : index_(index), camera_(camera), config_(config), depth_(half_view(camera), kDepthCell_px / camera.focal_px()) {
+    : index_(index),
+      camera_(camera),
+      config_(config),
+      depth_(half_view(camera), kDepthCell_px / camera.focal_px()) {
   // Widest angle of a ray through the image's border, plus the margin.
   double widest = 0;
   const ImageSize size = camera.size();
@@ -177,7 +189,8 @@ bool VisibleSet::add(std::uint32_t point, const Eigen::Vector2d& pixel, const Ei
   const int row = static_cast<int>((pixel.y() + config_.margin_px) / config_.stride_px) + 1;
   for (int r = row - 1; r <= row + 1; ++r)
     for (int c = column - 1; c <= column + 1; ++c)
-      for (std::int32_t k = cells_[static_cast<std::size_t>(r * columns_ + c)]; k >= 0; k = chosen_[static_cast<std::size_t>(k)].next) {
+      for (std::int32_t k = cells_[static_cast<std::size_t>(r * columns_ + c)]; k >= 0;
+           k = chosen_[static_cast<std::size_t>(k)].next) {
         const Chosen& other = chosen_[static_cast<std::size_t>(k)];
         const Eigen::Vector2f d = u - other.pixel;
         if (d.squaredNorm() < stride * stride && std::abs(t.x() * d.y() - t.y() * d.x()) < kSameLine_px &&
@@ -222,7 +235,8 @@ void VisibleSet::refresh(const Pose& T_map_cam) {
       const auto pixel = camera_.project(x, &jacobian);
       if (!pixel || !size.contains(*pixel, -config_.margin_px)) continue;
       const Eigen::Vector3d tangent = R * point.tangent.cast<double>();
-      if (tangent.cross(x).squaredNorm() < config_.grazing_sin * config_.grazing_sin * x.squaredNorm()) continue;
+      if (tangent.cross(x).squaredNorm() < config_.grazing_sin * config_.grazing_sin * x.squaredNorm())
+        continue;
       if (occlusion && depth_.hides(x)) continue;
       ++candidates_;
       const Eigen::Vector2d direction = jacobian * tangent;

@@ -14,17 +14,17 @@ namespace evpose {
 
 class ConfigTable;
 
-/// A map's points sorted into cubes, so that a query touches only the cubes near a view: its cost does not grow
-/// with the map.
+/// A map's points sorted into cubes, so that a query touches only the cubes near a view: its cost does not
+/// grow with the map.
 class ContourIndex {
  public:
   /// Keeps a reference to `map`. `cube_m`: edge of a cube.
   explicit ContourIndex(const ContourMap& map, double cube_m = 0.5);
 
   struct Cube {
-    Eigen::Vector3f centre;          ///< of its points' bounding box, relative to the map's anchor
-    float radius;                    ///< of the sphere around its points, metres
-    std::uint32_t begin, end;        ///< range of order()
+    Eigen::Vector3f centre;    ///< of its points' bounding box, relative to the map's anchor
+    float radius;              ///< of the sphere around its points, metres
+    std::uint32_t begin, end;  ///< range of order()
   };
   const std::vector<Cube>& cubes() const { return cubes_; }
   /// Point numbers of the map, cube after cube.
@@ -51,24 +51,26 @@ class ContourIndex {
 };
 
 struct VisibleSetConfig {
-  double far_m = 40;          ///< points further away are left out
-  double near_m = 0.1;        ///< points nearer are left out
-  double stride_px = 4;       ///< least distance of two points along one contour, in the image
-  int budget = 6000;          ///< most points in all
-  double margin_px = 12;      ///< points may lie this far outside of the image when chosen
-  double refresh_px = 8;      ///< chosen again when the view has moved by this much
-  bool occlusion = true;      ///< leave out points behind the map's occluders, if it has any
-  double grazing_sin = 0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
+  double far_m = 40;      ///< points further away are left out
+  double near_m = 0.1;    ///< points nearer are left out
+  double stride_px = 4;   ///< least distance of two points along one contour, in the image
+  int budget = 6000;      ///< most points in all
+  double margin_px = 12;  ///< points may lie this far outside of the image when chosen
+  double refresh_px = 8;  ///< chosen again when the view has moved by this much
+  bool occlusion = true;  ///< leave out points behind the map's occluders, if it has any
+  double grazing_sin =
+      0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
 };
 void describe(ConfigTable& table, VisibleSetConfig& config);
 
-/// The points to align: inside the frustum, not hidden, evenly along every contour, the same from update to update until the view has moved (EV-Pose 5.3, "view-limited, occlusion-aware").
+/// The points to align: inside the frustum, not hidden, evenly along every contour, the same from update to
+/// update until the view has moved (EV-Pose 5.3, "view-limited, occlusion-aware").
 class VisibleSet {
  public:
   VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config);
 
-  /// Point numbers of the map for this pose, in an order that depends on nothing but map, camera and the pose at
-  /// the last refresh.
+  /// Point numbers of the map for this pose, in an order that depends on nothing but map, camera and the pose
+  /// at the last refresh.
   const std::vector<std::uint32_t>& choose(const Pose& T_map_cam);
 
   /// As of the last call of choose().

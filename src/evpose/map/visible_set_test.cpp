@@ -27,15 +27,18 @@ ContourMap random_map(std::size_t n, double half_extent_m) {
 class VisibleLaws : public ::testing::Test {
  protected:
   VisibleLaws() : map_(random_map(20000, 8)), index_(map_) {
-    camera_ = std::move(make_camera({300, 300, 159.5, 119.5, "radtan", {-0.1, 0.02, 0, 0}, {320, 240}})).value();
+    camera_ =
+        std::move(make_camera({300, 300, 159.5, 119.5, "radtan", {-0.1, 0.02, 0, 0}, {320, 240}})).value();
     pose_ = {so3::exp({0.3, -0.5, 0.2}), map_.anchor + Eigen::Vector3d(1, 0.5, -2)};
   }
   /// By looking at every point.
   bool in_frustum(std::uint32_t i, const VisibleSetConfig& c) const {
     const Eigen::Vector3d x = pose_.inverse() * map_.position(i);
     const auto pixel = camera_->project(x);
-    return pixel && x.z() >= c.near_m && x.norm() <= c.far_m && camera_->size().contains(*pixel, -c.margin_px) &&
-           (pose_.q.conjugate() * map_.points[i].tangent.cast<double>()).cross(x.normalized()).norm() >= c.grazing_sin;
+    return pixel && x.z() >= c.near_m && x.norm() <= c.far_m &&
+           camera_->size().contains(*pixel, -c.margin_px) &&
+           (pose_.q.conjugate() * map_.points[i].tangent.cast<double>()).cross(x.normalized()).norm() >=
+               c.grazing_sin;
   }
   ContourMap map_;
   ContourIndex index_;
@@ -49,7 +52,8 @@ TEST_F(VisibleLaws, IndexFindsWhatBruteForceFinds) {
     index_.near(pose_.p, radius, cubes);
     std::set<std::uint32_t> found;
     for (const std::uint32_t c : cubes)
-      for (std::uint32_t k = index_.cubes()[c].begin; k < index_.cubes()[c].end; ++k) found.insert(index_.order()[k]);
+      for (std::uint32_t k = index_.cubes()[c].begin; k < index_.cubes()[c].end; ++k)
+        found.insert(index_.order()[k]);
     for (std::uint32_t i = 0; i < map_.points.size(); ++i)
       if ((map_.position(i) - pose_.p).norm() < radius - 1e-4) {
         EXPECT_TRUE(found.count(i)) << i;

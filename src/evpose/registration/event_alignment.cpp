@@ -10,8 +10,8 @@ namespace evpose {
 namespace {
 
 constexpr float kNoRival = 1e9F;
-constexpr double kEdgePrior = 0.5;      // an event in the gate is of the contour rather than clutter
-constexpr double kLeastCurvature = 0.2; // of the soft assignment's, as a share of the weight
+constexpr double kEdgePrior = 0.5;       // an event in the gate is of the contour rather than clutter
+constexpr double kLeastCurvature = 0.2;  // of the soft assignment's, as a share of the weight
 
 }  // namespace
 
@@ -20,18 +20,25 @@ void describe(ConfigTable& table, EventAlignmentConfig& c) {
   table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
   table.add("shared_sigma_px", c.shared_sigma_px, "px", "error that neighbouring events share", {0, 10});
   table.add("shared_s", c.shared_s, "s", "how long a shared error lasts", {0, 100});
-  table.add("map_sigma_m", c.map_sigma_m, "m", "error across the contour of map points that state none", {0, 1});
+  table.add("map_sigma_m", c.map_sigma_m, "m", "error across the contour of map points that state none",
+            {0, 1});
   table.add("lateness_px", c.lateness_px, "px", "events come so much after the contour", {-1, 1});
-  table.add("lateness_from_px_s", c.lateness_from_px_s, "px/s", "lateness fades out below this flow", {0, 1e4});
+  table.add("lateness_from_px_s", c.lateness_from_px_s, "px/s", "lateness fades out below this flow",
+            {0, 1e4});
   table.add("strip_px", c.strip_px, "px", "half length along the contour that a sample stands for", {1, 64});
-  table.add("ambiguity_px", c.ambiguity_px, "px", "events between two contours as similarly near as this are left out", {0, 50});
-  table.add("cluster_px", c.cluster_px, "px", "cells whose events share an error, at 640 px width", {4, 4096});
-  table.add("start_caution", c.start_caution, "", "information is divided by 1 + this at the start", {0, 1e6});
+  table.add("ambiguity_px", c.ambiguity_px, "px",
+            "events between two contours as similarly near as this are left out", {0, 50});
+  table.add("cluster_px", c.cluster_px, "px", "cells whose events share an error, at 640 px width",
+            {4, 4096});
+  table.add("start_caution", c.start_caution, "", "information is divided by 1 + this at the start",
+            {0, 1e6});
   table.add("start_caution_s", c.start_caution_s, "s", "time constant of the start's caution", {1e-3, 100});
 }
 
-EventAlignment::EventAlignment(ImageSize size, const EventAlignmentConfig& config) : size_(size), config_(config) {
-  claims_.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height), {-1, 0, 0, kNoRival});
+EventAlignment::EventAlignment(ImageSize size, const EventAlignmentConfig& config)
+    : size_(size), config_(config) {
+  claims_.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height),
+                 {-1, 0, 0, kNoRival});
 }
 
 double EventAlignment::lateness(double speed_px_s) const {
@@ -65,7 +72,8 @@ void EventAlignment::claim_strips(const EventAlignmentProblem& p) {
         if (across > reach || along > config_.strip_px) continue;
         const auto index = static_cast<std::uint32_t>(y * size_.width + x);
         Claim& claim = claims_[index];
-        const Claim mine{static_cast<std::int32_t>(i), static_cast<float>(across), static_cast<float>(along), kNoRival};
+        const Claim mine{static_cast<std::int32_t>(i), static_cast<float>(across), static_cast<float>(along),
+                         kNoRival};
         if (claim.sample < 0) {
           claim = mine;
           touched_.push_back(index);

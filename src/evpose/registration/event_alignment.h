@@ -15,54 +15,56 @@ namespace evpose {
 class ConfigTable;
 
 struct EventAlignmentConfig {
-  double gate_px = 0.55;          ///< an event belongs to a contour within this distance plus two sigma
-  double event_sigma_px = 0.7;    ///< scatter of a contour's events about it
-  double shared_sigma_px = 0.35;  ///< error that neighbouring events share (clutter, lateness)
-  double shared_s = 0.1;          ///< ... and that lasts so long
-  double map_sigma_m = 0.5e-3;    ///< of map points that state no sigma
-  double lateness_px = 0.10;      ///< events come so much after the contour
-  double lateness_from_px_s = 20; ///< normal flow below which lateness fades out
-  double strip_px = 4;            ///< half length along the contour that a sample stands for
-  double ambiguity_px = 1.0;      ///< events between two contours, with distances as similar as this, are left out
-  int cluster_px = 32;            ///< cells whose events share an error, at 640 px width
-  double start_caution = 10;      ///< information is divided by 1 + this at the start,
-  double start_caution_s = 0.3;   ///< ... fading with this time constant
+  double gate_px = 0.55;           ///< an event belongs to a contour within this distance plus two sigma
+  double event_sigma_px = 0.7;     ///< scatter of a contour's events about it
+  double shared_sigma_px = 0.35;   ///< error that neighbouring events share (clutter, lateness)
+  double shared_s = 0.1;           ///< ... and that lasts so long
+  double map_sigma_m = 0.5e-3;     ///< of map points that state no sigma
+  double lateness_px = 0.10;       ///< events come so much after the contour
+  double lateness_from_px_s = 20;  ///< normal flow below which lateness fades out
+  double strip_px = 4;             ///< half length along the contour that a sample stands for
+  double ambiguity_px =
+      1.0;              ///< events between two contours, with distances as similar as this, are left out
+  int cluster_px = 32;  ///< cells whose events share an error, at 640 px width
+  double start_caution = 10;     ///< information is divided by 1 + this at the start,
+  double start_caution_s = 0.3;  ///< ... fading with this time constant
 };
 void describe(ConfigTable& table, EventAlignmentConfig& config);
 
 /// A visible contour sample and its motion over the events' span.
 struct ContourSample {
-  Eigen::Vector2d pixel;        ///< at the time of the update, predicted
-  Eigen::Vector2d normal_px;    ///< unit, across the contour
-  double speed_px_s = 0;        ///< s1: normal . velocity of the contour in the image
-  double curvature_px_s2 = 0;   ///< s2: normal . (u(t - a) - u(t)) = -s1 a + s2 a^2 for age a
-  Vector6d jacobian;            ///< derivative of an event's signed distance by the pose perturbation
-  double map_sigma_px = 0;      ///< the map's error across the contour, in the image
+  Eigen::Vector2d pixel;       ///< at the time of the update, predicted
+  Eigen::Vector2d normal_px;   ///< unit, across the contour
+  double speed_px_s = 0;       ///< s1: normal . velocity of the contour in the image
+  double curvature_px_s2 = 0;  ///< s2: normal . (u(t - a) - u(t)) = -s1 a + s2 a^2 for age a
+  Vector6d jacobian;           ///< derivative of an event's signed distance by the pose perturbation
+  double map_sigma_px = 0;     ///< the map's error across the contour, in the image
 };
 
 struct EventAlignmentProblem {
-  std::span<const FrontEvent> events;          ///< kept since the last update
-  std::uint32_t now_us;                        ///< time of the update, on the events' clock
-  double span_s;                               ///< since the last update
-  double running_s;                            ///< since the start
+  std::span<const FrontEvent> events;  ///< kept since the last update
+  std::uint32_t now_us;                ///< time of the update, on the events' clock
+  double span_s;                       ///< since the last update
+  double running_s;                    ///< since the start
   std::span<const ContourSample> samples;
-  const Matrix6d& pose_covariance;             ///< of the prediction
+  const Matrix6d& pose_covariance;  ///< of the prediction
 };
 
 struct EventAlignmentResult {
-  Matrix6d information = Matrix6d::Zero();   ///< relative to the predicted pose
-  Vector6d vector = Vector6d::Zero();        ///< information * offset
-  int matched_samples = 0;                   ///< with at least one event in the gate
+  Matrix6d information = Matrix6d::Zero();  ///< relative to the predicted pose
+  Vector6d vector = Vector6d::Zero();       ///< information * offset
+  int matched_samples = 0;                  ///< with at least one event in the gate
   int matched_events = 0;
-  double mean_square_px2 = 0;                ///< weighted, of the signed distances
+  double mean_square_px2 = 0;  ///< weighted, of the signed distances
 };
 
-/// Registration of each event once, at its own time, against the moving contours: the distance field of EV-Pose
-/// 4.2 turned round. An event at x of age a has the signed distance
+/// Registration of each event once, at its own time, against the moving contours: the distance field of
+/// EV-Pose 4.2 turned round. An event at x of age a has the signed distance
 ///   d = n.(x - u) + s1 a - s2 a^2 + lateness sign(s1)
-/// from the contour sample that claims its pixel; d is zero-mean Gaussian for events of the contour and uniform
-/// over the gate for clutter (soft assignment). The gate follows the predicted covariance and the map's sigma.
-/// Events of a cell and direction share errors that last; their information is capped accordingly.
+/// from the contour sample that claims its pixel; d is zero-mean Gaussian for events of the contour and
+/// uniform over the gate for clutter (soft assignment). The gate follows the predicted covariance and the
+/// map's sigma. Events of a cell and direction share errors that last; their information is capped
+/// accordingly.
 class EventAlignment {
  public:
   EventAlignment(ImageSize size, const EventAlignmentConfig& config);
@@ -84,9 +86,9 @@ class EventAlignment {
 
   ImageSize size_;
   EventAlignmentConfig config_;
-  std::vector<Claim> claims_;              ///< one per pixel; sample < 0: none
-  std::vector<std::uint32_t> touched_;     ///< pixels claimed, to be released
-  std::vector<double> sigma_px_, gate_px_;   ///< per sample
+  std::vector<Claim> claims_;               ///< one per pixel; sample < 0: none
+  std::vector<std::uint32_t> touched_;      ///< pixels claimed, to be released
+  std::vector<double> sigma_px_, gate_px_;  ///< per sample
   std::vector<Sum> sums_;
 };
 

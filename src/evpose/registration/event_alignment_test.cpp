@@ -13,7 +13,8 @@ constexpr std::uint32_t kNow = 500'000;
 constexpr double kSpan_s = 0.004;
 constexpr double kFocal = 300;  // px per metre of the toy camera: a shift of the body shifts the image
 
-/// Straight contours in a 320 x 240 image; the pose's first two parameters shift the image, the others do nothing.
+/// Straight contours in a 320 x 240 image; the pose's first two parameters shift the image, the others do
+/// nothing.
 class EventAlignmentLaws : public ::testing::Test {
  protected:
   EventAlignmentLaws() {
@@ -33,7 +34,8 @@ class EventAlignmentLaws : public ::testing::Test {
     }
   }
 
-  /// One event a pixel along each line at a random age, `offset` px along the normal from the contour of then.
+  /// One event a pixel along each line at a random age, `offset` px along the normal from the contour of
+  /// then.
   void draw_events(double offset, unsigned seed = 1) {
     std::mt19937 random(seed);
     for (const auto& s : samples_) {
@@ -91,7 +93,7 @@ TEST_F(EventAlignmentLaws, EventsOfAnyAgeMeetTheContourWhereItWasThen) {
 TEST_F(EventAlignmentLaws, AccelerationOfTheContourCounts) {
   add_line({150, 40}, {1, 0}, 500);
   for (auto& s : samples_) s.curvature_px_s2 = 62'500;  // 1 px at 4 ms
-  add_event({149, 60}, 0.004);  // 150 - 2 + 1
+  add_event({149, 60}, 0.004);                          // 150 - 2 + 1
   const EventAlignmentResult r = align();
   EXPECT_EQ(r.matched_events, 1);
   EXPECT_LT(r.mean_square_px2, 1e-9);

@@ -28,8 +28,8 @@ struct NormalEquations {
   }
 };
 
-NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationConfig& config, const Pose& T_map_body,
-                           ThreadPool& pool) {
+NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationConfig& config,
+                           const Pose& T_map_body, ThreadPool& pool) {
   const std::size_t n = problem.points.size();
   std::vector<NormalEquations> partial(ThreadPool::chunks(n, kChunk));
   const double c2 = config.robust_scale * config.robust_scale;
@@ -56,9 +56,12 @@ NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationCo
   return sum;
 }
 
-double information_scale(const RegistrationConfig& c) { return 1 / (c.noise * c.noise * c.correlated_points); }
+double information_scale(const RegistrationConfig& c) {
+  return 1 / (c.noise * c.noise * c.correlated_points);
+}
 
-void fill(const AlignmentProblem& problem, double scale, const NormalEquations& normal, AlignmentResult* result) {
+void fill(const AlignmentProblem& problem, double scale, const NormalEquations& normal,
+          AlignmentResult* result) {
   result->information = scale * normal.H;
   result->vector =
       scale * normal.b + result->information * result->T_map_body.minus(problem.T_map_body_predicted);
@@ -74,10 +77,12 @@ void describe(ConfigTable& table, RegistrationConfig& c) {
             "minimiser; ceres is the slow reference");
   table.add("kernel", c.kernel, {{"bilinear", FieldKernel::bilinear}, {"spline", FieldKernel::spline}},
             "field between pixels");
-  table.add("decay_px", c.decay_px, "px", "time constant of the field, as predicted motion across the contour", {0.05, 100});
+  table.add("decay_px", c.decay_px, "px",
+            "time constant of the field, as predicted motion across the contour", {0.05, 100});
   table.add("decay_min_s", c.decay_min_s, "s", "shortest time constant", {1e-4, 10});
   table.add("decay_max_s", c.decay_max_s, "s", "longest time constant", {1e-4, 10});
-  table.add("robust_scale", c.robust_scale, "", "residual (0..1) beyond which Tukey's loss is flat", {0.01, 100});
+  table.add("robust_scale", c.robust_scale, "", "residual (0..1) beyond which Tukey's loss is flat",
+            {0.01, 100});
   table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
   table.add("max_iterations", c.max_iterations, "", "most iterations of the minimiser", {1, 100});
   table.add("converged_px", c.converged_px, "px", "a smaller step ends the iteration", {1e-6, 10});

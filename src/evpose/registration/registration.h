@@ -26,22 +26,22 @@ enum class Solver { gauss_newton, ceres };
 struct RegistrationConfig {
   Solver solver = Solver::gauss_newton;
   FieldKernel kernel = FieldKernel::spline;
-  double decay_px = 0.5;        ///< time constant of the field as predicted motion of the point across its contour
-  double decay_min_s = 3e-3;    ///< ... but at least
-  double decay_max_s = 30e-3;   ///< ... and at most; min = max gives the paper's constant
-  double robust_scale = 1.1;    ///< residual (0..1) beyond which Tukey's loss is flat
-  double stride_px = 12;          ///< least distance of two points along one contour
+  double decay_px = 0.5;  ///< time constant of the field as predicted motion of the point across its contour
+  double decay_min_s = 3e-3;   ///< ... but at least
+  double decay_max_s = 30e-3;  ///< ... and at most; min = max gives the paper's constant
+  double robust_scale = 1.1;   ///< residual (0..1) beyond which Tukey's loss is flat
+  double stride_px = 12;       ///< least distance of two points along one contour
   int max_iterations = 6;
-  double converged_px = 0.01;   ///< a step that moves the points by less ends the iteration
-  double noise = 0.5;           ///< 1 sigma of a residual at the optimum
-  double correlated_points = 300; ///< so many points share one error: the information is divided by it
+  double converged_px = 0.01;      ///< a step that moves the points by less ends the iteration
+  double noise = 0.5;              ///< 1 sigma of a residual at the optimum
+  double correlated_points = 300;  ///< so many points share one error: the information is divided by it
 };
 void describe(ConfigTable& table, RegistrationConfig& config);
 
 /// A contour point as one update needs it.
 struct AlignmentPoint {
-  Eigen::Vector3d position_map;   ///< metres
-  double decay_us = 0;            ///< time constant of the field at this point
+  Eigen::Vector3d position_map;  ///< metres
+  double decay_us = 0;           ///< time constant of the field at this point
 };
 
 struct AlignmentProblem {
@@ -49,20 +49,21 @@ struct AlignmentProblem {
   const Camera& camera;
   const Pose& T_body_cam;
   const std::vector<AlignmentPoint>& points;
-  std::uint32_t now_us;                ///< on the surface's clock
+  std::uint32_t now_us;  ///< on the surface's clock
   const Pose& T_map_body_predicted;
-  const Matrix6d& prior_information;   ///< of the predicted pose, perturbed as Pose::plus
+  const Matrix6d& prior_information;  ///< of the predicted pose, perturbed as Pose::plus
 };
 
 struct AlignmentResult {
-  Pose T_map_body;                              ///< minimum of the points' and the prior's cost together
-  Matrix6d information = Matrix6d::Zero();      ///< of the points alone, at the minimum
-  Vector6d vector = Vector6d::Zero();           ///< information * (offset of the points' own minimum from the prediction)
+  Pose T_map_body;                          ///< minimum of the points' and the prior's cost together
+  Matrix6d information = Matrix6d::Zero();  ///< of the points alone, at the minimum
+  Vector6d vector =
+      Vector6d::Zero();  ///< information * (offset of the points' own minimum from the prediction)
   int iterations = 0;
   bool converged = false;
-  int seen = 0;           ///< points inside the image
-  int matched = 0;        ///< of these, with a field of at least 1/e
-  double cost = 0;        ///< mean of the points' robust loss
+  int seen = 0;     ///< points inside the image
+  int matched = 0;  ///< of these, with a field of at least 1/e
+  double cost = 0;  ///< mean of the points' robust loss
 };
 
 /// EV-Pose eq. (1) with the prediction as prior (eq. 5 for the newest state):
@@ -77,7 +78,8 @@ AlignmentResult align_ceres(const AlignmentProblem& problem, const RegistrationC
 void evaluate_information(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool,
                           AlignmentResult* result);
 
-/// Residual 1 - T of one point and its derivative by the pose perturbation; false, 1 and zero outside of the image.
+/// Residual 1 - T of one point and its derivative by the pose perturbation; false, 1 and zero outside of the
+/// image.
 bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const Pose& T_map_body,
                     const AlignmentPoint& point, double* residual, Vector6d* jacobian);
 

@@ -10,8 +10,8 @@
 namespace evpose {
 namespace {
 
-/// The parameter is the perturbation d of the predicted pose; the derivative by d follows from that by a further
-/// small perturbation e: T(d).plus(e) = T(d + (e_p, Jr^-1 e_phi)).
+/// The parameter is the perturbation d of the predicted pose; the derivative by d follows from that by a
+/// further small perturbation e: T(d).plus(e) = T(d + (e_p, Jr^-1 e_phi)).
 class PointCost final : public ceres::SizedCostFunction<1, 6> {
  public:
   PointCost(const AlignmentProblem& problem, FieldKernel kernel, const AlignmentPoint& point, double scale)
@@ -22,7 +22,8 @@ class PointCost final : public ceres::SizedCostFunction<1, 6> {
     Vector6d J;
     const bool wanted = jacobians != nullptr && jacobians[0] != nullptr;
     double r = 0;
-    evaluate_point(problem_, kernel_, problem_.T_map_body_predicted.plus(d), point_, &r, wanted ? &J : nullptr);
+    evaluate_point(problem_, kernel_, problem_.T_map_body_predicted.plus(d), point_, &r,
+                   wanted ? &J : nullptr);
     residuals[0] = root_scale_ * r;
     if (wanted) {
       Eigen::Map<Eigen::Matrix<double, 1, 6>> out(jacobians[0]);

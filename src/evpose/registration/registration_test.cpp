@@ -109,8 +109,9 @@ TEST_F(AlignmentLaws, FindsThePoseTheEventsWereDrawnFrom) {
   const auto mean_offset_px = [&](const Pose& pose) {
     double sum = 0;
     for (std::size_t i = 0; i < points_.size(); ++i)
-      sum += std::abs(normals_[i].dot(
-          *camera_->project((pose * T_body_cam_).inverse() * points_[i].position_map) - *camera_->project(cam_[i])));
+      sum += std::abs(
+          normals_[i].dot(*camera_->project((pose * T_body_cam_).inverse() * points_[i].position_map) -
+                          *camera_->project(cam_[i])));
     return sum / static_cast<double>(points_.size());
   };
   EXPECT_GT(mean_offset_px(off(truth_)), 0.8);
@@ -187,7 +188,8 @@ TEST(TemporalField, GradientMatchesDifferences) {
     surface.insert(static_cast<int>(random() % 30), static_cast<int>(random() % 30), Polarity::on,
                    static_cast<std::uint32_t>(random() % 10000 + 1), 1);
   for (FieldKernel kernel : {FieldKernel::bilinear, FieldKernel::spline})
-    for (const Eigen::Vector2d& u : {Eigen::Vector2d(10.3, 12.6), Eigen::Vector2d(3.5, 25.2), Eigen::Vector2d(0.4, 28.7)}) {
+    for (const Eigen::Vector2d& u :
+         {Eigen::Vector2d(10.3, 12.6), Eigen::Vector2d(3.5, 25.2), Eigen::Vector2d(0.4, 28.7)}) {
       const auto value = [&](double dx, double dy) {
         return sample_field(surface, u + Eigen::Vector2d(dx, dy), 10000, 4000, kernel).value;
       };

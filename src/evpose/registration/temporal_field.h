@@ -14,11 +14,11 @@ enum class FieldKernel {
   spline,    ///< cubic B-spline: smooths over +-2 px, slope continuous
 };
 
-/// Value and gradient of T(u) = max over polarities of exp(-(now - last(u)) / decay) between pixels: one minus
-/// the temporal distance field (EV-Pose 4.2). Evaluated where it is read, never as an image.
+/// Value and gradient of T(u) = max over polarities of exp(-(now - last(u)) / decay) between pixels: one
+/// minus the temporal distance field (EV-Pose 4.2). Evaluated where it is read, never as an image.
 struct FieldSample {
-  double value = 0;                                     ///< 0 (no event) .. 1 (event now)
-  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();   ///< per px
+  double value = 0;                                    ///< 0 (no event) .. 1 (event now)
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();  ///< per px
 };
 
 /// `pixel` within the image, at most one pixel from its border outwards; `decay_us` > 0.

@@ -12,12 +12,12 @@ namespace evpose {
 class ConfigTable;
 
 struct HealthConfig {
-  double initialise_s = 0.05;       ///< accepted registrations for so long make "tracking" of "initialising"
-  double degraded_after_s = 0.1;    ///< without an accepted registration
-  double degraded_sigma_px = 2.0;   ///< pose uncertainty, as image motion of the typical point
-  double lost_sigma_px = 8.0;       ///< beyond the capture range of the registration
-  int least_points = 12;            ///< fewer matched points are not used
-  double gate = 25;                 ///< largest normalised innovation squared / 6 of a registration that is used
+  double initialise_s = 0.05;      ///< accepted registrations for so long make "tracking" of "initialising"
+  double degraded_after_s = 0.1;   ///< without an accepted registration
+  double degraded_sigma_px = 2.0;  ///< pose uncertainty, as image motion of the typical point
+  double lost_sigma_px = 8.0;      ///< beyond the capture range of the registration
+  int least_points = 12;           ///< fewer matched points are not used
+  double gate = 25;  ///< largest normalised innovation squared / 6 of a registration that is used
 };
 void describe(ConfigTable& table, HealthConfig& config);
 
@@ -25,8 +25,8 @@ void describe(ConfigTable& table, HealthConfig& config);
 struct Evidence {
   TimeNs t = 0;
   bool accepted = false;
-  std::string refused;       ///< why not accepted
-  double sigma_px = 0;       ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
+  std::string refused;  ///< why not accepted
+  double sigma_px = 0;  ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
 };
 
 /// The state machine of design.md 5.9: waiting, initialising, tracking, degraded, lost; each with a reason.

@@ -36,7 +36,8 @@ double median(std::vector<double>& values) {
 
 void describe(ConfigTable& table, TrackerConfig& c) {
   table.add("rate_hz", c.rate_hz, "Hz", "updates per second of data time", {1, 5000});
-  table.add("threads", c.threads, "", "threads of the alignment; the result is the same for any number", {1, 64});
+  table.add("threads", c.threads, "", "threads of the alignment; the result is the same for any number",
+            {1, 64});
   table.group("events", c.events);
   table.group("visible", c.visible);
   table.add("field", c.field, {{"events", FieldKind::events}, {"exponential", FieldKind::exponential}},
@@ -51,18 +52,22 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
                                                    const StartState& start, StageClock clock) {
   EVPOSE_CHECK(setup.camera != nullptr && setup.map != nullptr);
   const ContourMap& map = *setup.map;
-  if (map.points.empty()) return Error{map.source, "the map has no contour points", "give a map with contours"};
-  if (!start.T_map_body.p.allFinite() || !start.T_map_body.q.coeffs().allFinite() || !start.velocity.allFinite())
+  if (map.points.empty())
+    return Error{map.source, "the map has no contour points", "give a map with contours"};
+  if (!start.T_map_body.p.allFinite() || !start.T_map_body.q.coeffs().allFinite() ||
+      !start.velocity.allFinite())
     return Error{"start pose", "not finite", "check --init"};
   const double outside = distance_outside(map, start.T_map_body.p);
   if (outside > config.visible.far_m)
-    return Error{"start pose", text("(", start.T_map_body.p.x(), ", ", start.T_map_body.p.y(), ", ", start.T_map_body.p.z(),
-                                    ") m is ", outside, " m off the map, which is seen up to ", config.visible.far_m, " m"),
+    return Error{"start pose",
+                 text("(", start.T_map_body.p.x(), ", ", start.T_map_body.p.y(), ", ", start.T_map_body.p.z(),
+                      ") m is ", outside, " m off the map, which is seen up to ", config.visible.far_m, " m"),
                  "check that map and start pose share one frame (frames.T_map_world in recording.yaml)"};
   return std::unique_ptr<Tracker>(new Tracker(setup, config, start, std::move(clock)));
 }
 
-Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock)
+Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start,
+                 StageClock clock)
     : setup_(setup),
       config_(config),
       clock_(std::move(clock)),
@@ -91,7 +96,8 @@ void Tracker::add_events(const EventPacket& packet) {
   std::size_t from = 0;
   if (waiting_.empty()) consume(packet, &from);
   if (from == packet.events.size()) return;
-  waiting_.push_back({packet.base, {packet.events.begin() + static_cast<std::ptrdiff_t>(from), packet.events.end()}});
+  waiting_.push_back(
+      {packet.base, {packet.events.begin() + static_cast<std::ptrdiff_t>(from), packet.events.end()}});
 }
 
 void Tracker::pump() {
@@ -128,7 +134,8 @@ void Tracker::consume(const EventPacket& packet, std::size_t* from) {
 
 void Tracker::predict(TimeNs t) {
   if (setup_.motion == MotionModel::constant_velocity) return ekf_.predict(t);
-  // Make the first sample stand at the state's time, then step from sample to sample; the last step ends at t.
+  // Make the first sample stand at the state's time, then step from sample to sample; the last step ends at
+  // t.
   const TimeNs from = ekf_.state().t;
   if (imu_.front().t > from) imu_.push_front({from, imu_.front().gyro, imu_.front().accel});
   while (imu_.size() >= 2 && imu_[1].t <= from) imu_.pop_front();
@@ -151,7 +158,8 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
   Pose T_cam_map[3];
   for (int k = 0; k < 3; ++k) {
     const double age = 0.5 * k * span_s;
-    const Pose past{T_map_body.q * so3::exp(-age * rate_body), T_map_body.p - age * ekf_.state().nav.velocity};
+    const Pose past{T_map_body.q * so3::exp(-age * rate_body),
+                    T_map_body.p - age * ekf_.state().nav.velocity};
     T_cam_map[k] = (past * T_body_cam).inverse();
   }
   const Eigen::Matrix3d R_cam_map = T_cam_map[0].rotation();
@@ -166,7 +174,8 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
     const Eigen::Vector3d x_cam = T_cam_map[0] * position;
     Matrix23d J;
     const auto pixel = camera.project(x_cam, &J);
-    const auto half_ago = camera.project(T_cam_map[1] * position), ago = camera.project(T_cam_map[2] * position);
+    const auto half_ago = camera.project(T_cam_map[1] * position),
+               ago = camera.project(T_cam_map[2] * position);
     if (!pixel || !half_ago || !ago) continue;
     const Eigen::Vector2d along = J * (R_cam_map * map.points[i].tangent.cast<double>());
     if (!(along.norm() > 0)) continue;
@@ -200,13 +209,16 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
   const Matrix6d covariance = ekf_.state().pose_covariance();
   if (config_.field == FieldKind::events) {
-    const EventAlignmentResult r = alignment_.align({front_.kept(), front_.stamp(t), span_s,
-                                                     to_seconds(t - start_t_), samples_, covariance});
-    return {{r.information, r.vector}, static_cast<int>(samples_.size()), r.matched_samples, std::sqrt(r.mean_square_px2)};
+    const EventAlignmentResult r = alignment_.align(
+        {front_.kept(), front_.stamp(t), span_s, to_seconds(t - start_t_), samples_, covariance});
+    return {{r.information, r.vector},
+            static_cast<int>(samples_.size()),
+            r.matched_samples,
+            std::sqrt(r.mean_square_px2)};
   }
   const Matrix6d prior = covariance.ldlt().solve(Matrix6d::Identity());
-  const AlignmentProblem problem{front_.surface(), *setup_.camera, setup_.T_body_cam, points_,
-                                 front_.stamp(t), predicted,       prior};
+  const AlignmentProblem problem{
+      front_.surface(), *setup_.camera, setup_.T_body_cam, points_, front_.stamp(t), predicted, prior};
   const AlignmentResult r = align(problem, config_.exponential, pool_);
   return {{r.information, r.vector}, r.seen, r.matched, std::sqrt(r.cost)};
 }
@@ -244,10 +256,12 @@ Update Tracker::update(TimeNs t) {
 
   const Matrix6d covariance = ekf_.state().pose_covariance();
   const auto largest = [](const Eigen::Matrix3d& m) {
-    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
+    return std::sqrt(
+        std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
   };
-  evidence.sigma_px = setup_.camera->focal_px() * std::max(largest(covariance.topLeftCorner<3, 3>()) / typical_depth_m_,
-                                                           largest(covariance.bottomRightCorner<3, 3>()));
+  evidence.sigma_px =
+      setup_.camera->focal_px() * std::max(largest(covariance.topLeftCorner<3, 3>()) / typical_depth_m_,
+                                           largest(covariance.bottomRightCorner<3, 3>()));
   out.health = health_.judge(evidence, &out.reason);
 
   const FusionState& state = ekf_.state();

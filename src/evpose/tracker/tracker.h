@@ -21,13 +21,13 @@
 namespace evpose {
 
 struct TrackerConfig {
-  double rate_hz = 300;   ///< updates per second of data time
-  int threads = 1;        ///< for the alignment; the estimate is the same for any number
+  double rate_hz = 300;  ///< updates per second of data time
+  int threads = 1;       ///< for the alignment; the estimate is the same for any number
   EventFrontConfig events;
   VisibleSetConfig visible;
   FieldKind field = FieldKind::events;
-  EventAlignmentConfig alignment;      ///< of field == events
-  RegistrationConfig exponential;      ///< of field == exponential
+  EventAlignmentConfig alignment;  ///< of field == events
+  RegistrationConfig exponential;  ///< of field == exponential
   EkfConfig ekf;
   HealthConfig health;
 };
@@ -36,7 +36,7 @@ void describe(ConfigTable& table, TrackerConfig& config);
 /// What the tracker is told once.
 struct TrackerSetup {
   std::shared_ptr<const Camera> camera;
-  Pose T_body_cam;                       ///< body = IMU; identity without an IMU
+  Pose T_body_cam;  ///< body = IMU; identity without an IMU
   MotionModel motion = MotionModel::imu;
   ImuNoise imu_noise;
   std::shared_ptr<const ContourMap> map;
@@ -50,8 +50,8 @@ struct StartState {
   Eigen::Vector3d angular_rate_body = Eigen::Vector3d::Zero();  ///< rad/s; used without an IMU
 };
 
-/// Events and IMU samples in, poses out. Knows neither files nor wall time; the same data give the same bytes,
-/// however they are cut into packets and for any number of threads.
+/// Events and IMU samples in, poses out. Knows neither files nor wall time; the same data give the same
+/// bytes, however they are cut into packets and for any number of threads.
 class Tracker {
  public:
   /// Seconds on any monotone clock; used for Update::times alone.
@@ -73,9 +73,9 @@ class Tracker {
   /// What the alignment saw at the last update, for pictures.
   struct Snapshot {
     ImageSize size;
-    std::vector<float> decay;   ///< row-major; > 0 on, < 0 off, exp(-age / decay_s)
+    std::vector<float> decay;  ///< row-major; > 0 on, < 0 off, exp(-age / decay_s)
     struct Point {
-      float x, y;               ///< px, at the updated pose
+      float x, y;  ///< px, at the updated pose
       bool matched;
     };
     std::vector<Point> points;
@@ -117,12 +117,12 @@ class Tracker {
   TimeNs start_t_;
   std::int64_t update_number_ = 0;
   TimeNs next_update_ = 0;
-  std::deque<ImuSample> imu_;              ///< from the state's time on; the first is at it once started
-  std::deque<EventPacket> waiting_;        ///< events that arrived before their IMU samples
-  std::size_t waiting_from_ = 0;           ///< consumed part of the first
+  std::deque<ImuSample> imu_;        ///< from the state's time on; the first is at it once started
+  std::deque<EventPacket> waiting_;  ///< events that arrived before their IMU samples
+  std::size_t waiting_from_ = 0;     ///< consumed part of the first
   EventAlignment alignment_;
-  std::vector<AlignmentPoint> points_;   ///< of the exponential field
-  std::vector<ContourSample> samples_;   ///< of the events' alignment
+  std::vector<AlignmentPoint> points_;  ///< of the exponential field
+  std::vector<ContourSample> samples_;  ///< of the events' alignment
   double typical_depth_m_ = 3;
   EventFront::Counts counted_;
   double events_time_s_ = 0;

@@ -5,11 +5,16 @@ namespace evpose {
 
 const char* to_string(Health health) {
   switch (health) {
-    case Health::waiting: return "waiting";
-    case Health::initialising: return "initialising";
-    case Health::tracking: return "tracking";
-    case Health::degraded: return "degraded";
-    case Health::lost: return "lost";
+    case Health::waiting:
+      return "waiting";
+    case Health::initialising:
+      return "initialising";
+    case Health::tracking:
+      return "tracking";
+    case Health::degraded:
+      return "degraded";
+    case Health::lost:
+      return "lost";
   }
   return "unknown";
 }

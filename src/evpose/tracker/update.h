@@ -31,16 +31,16 @@ struct Update {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    ///< of the body's origin, map frame, m/s
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< rad/s; without IMU: minus the angular rate
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< m/s^2
-  Matrix6d covariance = Matrix6d::Zero();                ///< of T_map_body: (translation, rotation), m^2, rad^2
+  Matrix6d covariance = Matrix6d::Zero();  ///< of T_map_body: (translation, rotation), m^2, rad^2
   Health health = Health::waiting;
-  std::string reason;             ///< of the health, in words; set when it changed, else empty
-  bool accepted = false;          ///< the registration passed the innovation gate and was used
-  std::int32_t events_read = 0;   ///< since the last update
-  std::int32_t events_kept = 0;   ///< of these, passed by the noise filter
-  std::int32_t points = 0;        ///< chosen map points
+  std::string reason;               ///< of the health, in words; set when it changed, else empty
+  bool accepted = false;            ///< the registration passed the innovation gate and was used
+  std::int32_t events_read = 0;     ///< since the last update
+  std::int32_t events_kept = 0;     ///< of these, passed by the noise filter
+  std::int32_t points = 0;          ///< chosen map points
   std::int32_t points_matched = 0;  ///< of these, with events near by
-  double residual = 0;            ///< root of the mean robust cost over the points, 0..1
-  double innovation = 0;          ///< normalised innovation squared / 6
+  double residual = 0;              ///< root of the mean robust cost over the points, 0..1
+  double innovation = 0;            ///< normalised innovation squared / 6
   StageTimes times;
 };
 

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One update of the tracker by stage, at two image sizes, with either field; all on one core.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "evpose/bench/scene.h"
+#include "evpose/map/visible_set.h"
+#include "evpose/tracker/tracker.h"
+
+namespace evpose::bench {
+namespace {
+
+constexpr double kRate_hz = 300;
+constexpr double kRun_s = 0.5;
+
+double clock_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Half a second of tracking under a load of `Mev_s` million events a second.
+void update(benchmark::State& state) {
+  const Scene scene = make_scene(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  const double rate = 1e6 * static_cast<double>(state.range(2));
+  TrackerConfig config;
+  config.rate_hz = kRate_hz;
+  config.field = state.range(3) == 0 ? FieldKind::events : FieldKind::exponential;
+  config.health.gate = -1;  // the random load must not move the pose; all stages run all the same
+  TrackerSetup setup;
+  setup.camera = scene.camera;
+  setup.motion = MotionModel::constant_velocity;
+  setup.map = std::make_shared<const ContourMap>(scene.map);
+  StartState start;
+  start.T_map_body = scene.T_map_cam;
+  start.velocity = scene.velocity;
+  start.angular_rate_body = scene.angular_rate;
+  const EventPacket packet = make_events(scene, static_cast<std::size_t>(rate * kRun_s), kRun_s);
+  std::vector<double> events, choose, align, all;
+  double points = 0;
+  for (auto _ : state) {
+    auto tracker = std::move(Tracker::create(setup, config, start, clock_s)).value();
+    tracker->on_update([&](const Update& u) {
+      events.push_back(u.times.events_s);
+      choose.push_back(u.times.choose_s);
+      align.push_back(u.times.register_s);
+      all.push_back(u.times.after_newest_event_s());
+      points += u.points;
+    });
+    tracker->add_events(packet);
+  }
+  const auto quantile_ms = [](std::vector<double>& v, double q) {
+    const auto at = v.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(v.size() - 1));
+    std::nth_element(v.begin(), at, v.end());
+    return 1e3 * *at;
+  };
+  state.counters["points"] = points / static_cast<double>(all.size());
+  state.counters["events_p50_ms"] = quantile_ms(events, 0.5);
+  state.counters["choose_p50_ms"] = quantile_ms(choose, 0.5);
+  state.counters["choose_p99_ms"] = quantile_ms(choose, 0.99);
+  state.counters["register_p50_ms"] = quantile_ms(align, 0.5);
+  state.counters["register_p99_ms"] = quantile_ms(align, 0.99);
+  state.counters["pose_p50_ms"] = quantile_ms(all, 0.5);
+  state.counters["pose_p99_ms"] = quantile_ms(all, 0.99);
+}
+BENCHMARK(update)
+    ->ArgNames({"width", "height", "Mev_s_in", "exponential"})
+    ->Args({640, 480, 2, 0})
+    ->Args({640, 480, 2, 1})
+    ->Args({1280, 720, 2, 0})
+    ->Args({1280, 720, 2, 1})
+    ->Args({1280, 720, 20, 0})
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(4);
+
+/// The choice of points when the view has moved (the dearest moment of an update).
+void visible_refresh(benchmark::State& state) {
+  const Scene scene = make_scene(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  const ContourIndex index(scene.map);
+  VisibleSetConfig config;
+  config.refresh_px = 0;
+  VisibleSet visible(index, *scene.camera, config);
+  Pose pose = scene.T_map_cam;
+  std::size_t points = 0;
+  for (auto _ : state) {
+    pose.p.y() += 1e-4;
+    points = visible.choose(pose).size();
+  }
+  state.counters["points"] = static_cast<double>(points);
+  state.counters["map_points"] = static_cast<double>(scene.map.points.size());
+}
+BENCHMARK(visible_refresh)
+    ->ArgNames({"width", "height"})
+    ->Args({640, 480})
+    ->Args({1280, 720})
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace evpose::bench

@@ -157,8 +157,10 @@ std::optional<std::vector<std::string>> Hdf5File::attribute_strings(const std::s
 }
 
 Status Hdf5File::make_group(const std::string& name) {
+  const auto properties = own(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+  H5Pset_obj_track_times(properties.get(), false);
   const auto group =
-      own(H5Gcreate2(id_.get(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+      own(H5Gcreate2(id_.get(), name.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose);
   if (!group) return failed("cannot write group " + name);
   return {};
 }

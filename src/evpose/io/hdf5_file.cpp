@@ -157,7 +157,9 @@ Expected<Hdf5File> Hdf5File::create(const TemporaryFile& temporary) {
   file.path_ = temporary.target();
   const auto access = own(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
-  file.id_ = own(H5Fcreate(temporary.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose);
+  const auto root = own(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+  H5Pset_obj_track_times(root.get(), false);
+  file.id_ = own(H5Fcreate(temporary.path().c_str(), H5F_ACC_TRUNC, root.get(), access.get()), H5Fclose);
   if (!file.id_) return file.failed("cannot be written");
   return file;
 }

@@ -20,8 +20,9 @@ struct EkfConfig {
   Eigen::Vector3d gravity_map{0, 0, -9.81};  ///< m/s^2
   double imu_noise_scale =
       1.5;  ///< on the densities of imu.yaml: calibrations are made at rest, drones vibrate
-  double cv_accel_density = 3.0;    ///< constant velocity: white acceleration, m/s^2/sqrt(Hz)
-  double cv_angular_density = 6.0;  ///< constant velocity: white angular acceleration, rad/s^2/sqrt(Hz)
+  double cv_accel_density = 1.5;    ///< constant velocity: white acceleration, m/s^2/sqrt(Hz); about 6 m/s^2
+                                    ///< that keep up for 50 ms. More only opens the gate to clutter.
+  double cv_angular_density = 1.5;  ///< ... white angular acceleration, rad/s^2/sqrt(Hz), likewise
   double start_position_sigma_m = 2e-3;
   double start_rotation_sigma_rad = 2e-3;
   double start_velocity_sigma_m_s = 0.05;

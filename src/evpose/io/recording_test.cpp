@@ -22,7 +22,7 @@ struct Parts {
   std::string yaml;
 
   std::string write(const TemporaryFolder& parent) const {
-    const std::string folder = parent / "flight";
+    std::string folder = parent / "flight";
     std::filesystem::remove_all(folder);
     std::filesystem::create_directory(folder);
     auto writer = EventWriterH5::create(folder + "/events.h5", {64, 48}, "");

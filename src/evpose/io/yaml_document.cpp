@@ -47,7 +47,7 @@ struct Converter {
         auto value = convert(member.second);
         if (!value) return value.error();
         value->line = line;  // where one looks for it
-        out.members.emplace_back(key, *std::move(value));
+        out.members.push_back({key, *std::move(value)});
       }
     }
     return out;

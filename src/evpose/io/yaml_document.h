@@ -13,15 +13,21 @@ namespace evpose {
 /// A YAML value as plain data that knows its line.
 struct YamlNode {
   enum class Kind { null, scalar, list, map };
+  struct Member;
 
   Kind kind = Kind::null;
   int line = 1;
   std::string scalar;
-  std::vector<YamlNode> items;                            ///< of a list
-  std::vector<std::pair<std::string, YamlNode>> members;  ///< of a map, in the order of the file
+  std::vector<YamlNode> items;  ///< of a list
+  std::vector<Member> members;  ///< of a map, in the order of the file
 
   /// The member of a map, or nullptr.
   const YamlNode* find(const std::string& key) const;
+};
+
+struct YamlNode::Member {
+  std::string key;
+  YamlNode value;
 };
 
 /// One file and its first document. The functions that read a value name file, line and `key` in their

@@ -83,7 +83,8 @@ void layout_plain(benchmark::State& state) {
   layout(state, sizeof(Plain),
          [](benchmark::State& s, const EventPacket& packet, Pass& pass, std::int64_t& shift) {
            std::vector<Plain> events;
-           for (const Event& e : packet.events) events.push_back({e.dt_us, e.x, e.y, e.on});
+           for (const Event& e : packet.events)
+             events.push_back({e.dt_us, e.x, e.y, static_cast<std::uint8_t>(e.on)});
            for (auto _ : s) {
              for (const Plain& e : events) pass.take(shift + e.t_us, e.x, e.y, e.on != 0);
              shift += 200'000;

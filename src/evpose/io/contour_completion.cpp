@@ -85,7 +85,7 @@ Eigen::Vector3f estimate_tangent(const ContourMap& map, std::size_t i,
     if (d.norm() > 0.5F * neighbour.distance) offsets.push_back(d);
   }
   const Eigen::Vector3f first = main_direction(offsets, Eigen::Vector3f::Zero());
-  const Eigen::Vector3f tangent = main_direction(offsets, first);
+  Eigen::Vector3f tangent = main_direction(offsets, first);
   if (tangent.isZero()) return tangent;
   // A sign that does not depend on the solver's.
   Eigen::Index largest = 0;

@@ -95,7 +95,7 @@ template <class T>
 std::string h5_file(const TemporaryFolder& folder, NumberType type, const std::vector<T>& t,
                     const std::vector<std::int16_t>& x, const std::vector<std::int8_t>& p,
                     const std::string& group = "/events") {
-  const std::string path = folder / "small.h5";
+  std::string path = folder / "small.h5";
   auto temporary = TemporaryFile::create(path);
   auto file = Hdf5File::create(*temporary);
   EXPECT_TRUE(file->make_group(group).ok());
@@ -202,8 +202,8 @@ TEST(EventsH5, ErrorsSayWhatWhereAndWhatToDo) {
   const TemporaryFolder folder;
   const std::vector<std::int16_t> x = {1, 2, 3};
   const std::vector<std::int8_t> p = {0, 1, 0};
-  const auto i64 = [&](std::vector<std::int64_t> t, std::vector<std::int16_t> xs,
-                       std::vector<std::int8_t> ps) {
+  const auto i64 = [&](const std::vector<std::int64_t>& t, const std::vector<std::int16_t>& xs,
+                       const std::vector<std::int8_t>& ps) {
     EventReadOptions options;
     options.size = {32, 24};
     return read_all(h5_file<std::int64_t>(folder, NumberType::i64, t, xs, ps), options).error;

@@ -8,8 +8,10 @@
 #include "evpose/core/log.h"
 #include "evpose/core/version.h"
 
-int main(int argc, char** argv) {
-  using namespace evpose;
+namespace evpose {
+namespace {
+
+int run_program(int argc, char** argv) {
   CLI::App app{"evpose: where the drone is, from events, IMU and a prior 3D map"};
   app.set_version_flag("--version", std::string("evpose ") + version());
   app.require_subcommand(1);
@@ -34,8 +36,15 @@ int main(int argc, char** argv) {
     return 2;
   }
   set_log_level(quiet ? LogLevel::quiet : verbose ? LogLevel::verbose : LogLevel::normal);
+  return run();
+}
+
+}  // namespace
+}  // namespace evpose
+
+int main(int argc, char** argv) {
   try {
-    return run();
+    return evpose::run_program(argc, argv);
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "evpose: out of memory; free some or use a smaller map\n");
   } catch (const std::exception& e) {

@@ -28,6 +28,7 @@ struct Known {
   std::size_t pairs;  ///< nearest, 10 ms
   double se3_cm, se3_interpolated_cm, sim3_cm, scale;
 };
+void PrintTo(const Known& known, std::ostream* out) { *out << known.name; }
 
 class Published : public testing::TestWithParam<Known> {};
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The table of docs/accuracy.md: every shared recording, tracked with the shipped defaults.
 
-    accuracy.py EVPOSE SHARED OUT.md     about a minute
+    accuracy.py EVPOSE SHARED OUT.md     about two minutes
 
 Each row is one run from ground truth, without alignment. Figures are those of the run's summary.json over the whole
 run, and, after 0.3 s, of `evpose eval --from`. Needs numpy and h5py for the real chunk.
@@ -20,6 +20,14 @@ VARIANTS = [  # name, extra arguments, with the IMU
     ("each event once", ["--occluders"], True),
     ("each event once, no occluders", [], True),
     ("the paper's field", ["--occluders", "--set", "field=exponential"], True),
+    ("the paper's field, bilinear", ["--occluders", "--set", "field=exponential", "--set", "exponential.kernel=bilinear"],
+     True),
+    ("the paper's field, 5 ms everywhere", ["--occluders", "--set", "field=exponential", "--set",
+                                            "exponential.decay_min_s=0.005", "--set", "exponential.decay_max_s=0.005"],
+     True),
+    ("the paper's field, 30 ms everywhere", ["--occluders", "--set", "field=exponential", "--set",
+                                             "exponential.decay_min_s=0.03", "--set", "exponential.decay_max_s=0.03"],
+     True),
     ("each event once, no IMU", ["--occluders"], False),
     ("the paper's field, no IMU", ["--occluders", "--set", "field=exponential"], False),
 ]

@@ -17,6 +17,7 @@ constexpr double kLeastCurvature = 0.2;  // of the soft assignment's, as a share
 
 void describe(ConfigTable& table, EventAlignmentConfig& c) {
   table.add("gate_px", c.gate_px, "px", "events within this plus two sigma belong to a contour", {0.1, 50});
+  table.add("widest_gate_px", c.widest_gate_px, "px", "the gate opens no further", {0.1, 50});
   table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
   table.add("shared_sigma_px", c.shared_sigma_px, "px", "error that neighbouring events share", {0, 10});
   table.add("shared_s", c.shared_s, "s", "how long a shared error lasts", {0, 100});
@@ -101,7 +102,8 @@ EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
     const ContourSample& s = p.samples[i];
     const double pose_variance = s.jacobian.dot(p.pose_covariance * s.jacobian);
     sigma_px_[i] = std::sqrt(std::max(0.0, pose_variance) + s.map_sigma_px * s.map_sigma_px);
-    gate_px_[i] = config_.gate_px + 2 * sigma_px_[i];
+    gate_px_[i] =
+        std::min(config_.gate_px + 2 * sigma_px_[i], std::max(config_.gate_px, config_.widest_gate_px));
   }
   claim_strips(p);
   sums_.assign(p.samples.size(), {});

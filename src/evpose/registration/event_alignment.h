@@ -16,6 +16,7 @@ class ConfigTable;
 
 struct EventAlignmentConfig {
   double gate_px = 0.55;           ///< an event belongs to a contour within this distance plus two sigma
+  double widest_gate_px = 6;       ///< bounds the work when the prediction is poor
   double event_sigma_px = 0.7;     ///< scatter of a contour's events about it
   double shared_sigma_px = 0.35;   ///< error that neighbouring events share (clutter, lateness)
   double shared_s = 0.1;           ///< ... and that lasts so long

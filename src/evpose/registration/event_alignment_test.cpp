@@ -118,6 +118,14 @@ TEST_F(EventAlignmentLaws, GateOpensWithThePredictionsUncertainty) {
   EXPECT_EQ(align().matched_events, 1);
 }
 
+TEST_F(EventAlignmentLaws, GateNeverOpensBeyondItsBound) {
+  add_line({150, 40}, {1, 0}, 0);
+  add_event({150 + config_.widest_gate_px + 1, 60}, 0);
+  add_event({150 + config_.widest_gate_px - 1, 64}, 0);
+  covariance_(0, 0) = std::pow(100 / kFocal, 2);
+  EXPECT_EQ(align().matched_events, 1);
+}
+
 TEST_F(EventAlignmentLaws, EventsBetweenTwoContoursAreLeftOut) {
   config_.gate_px = 2;
   add_line({150, 40}, {1, 0}, 0);

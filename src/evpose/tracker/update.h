@@ -39,7 +39,7 @@ struct Update {
   std::int32_t events_kept = 0;     ///< of these, passed by the noise filter
   std::int32_t points = 0;          ///< chosen map points
   std::int32_t points_matched = 0;  ///< of these, with events near by
-  double residual = 0;              ///< root of the mean robust cost over the points, 0..1
+  double residual = 0;              ///< RMS of event distances, px (events); of the loss, 0..1 (exponential)
   double innovation = 0;            ///< normalised innovation squared / 6
   StageTimes times;
 };

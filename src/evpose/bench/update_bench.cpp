@@ -2,7 +2,7 @@
 // One update of the tracker by stage, at two image sizes, with either field; all on one core.
 #include <benchmark/benchmark.h>
 
-#include <time.h>
+#include <ctime>
 
 #include <algorithm>
 

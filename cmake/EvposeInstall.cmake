@@ -10,7 +10,7 @@ foreach(module IN LISTS installed_modules)
   endif()
   install(TARGETS evpose_${module} EXPORT evposeTargets)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/evpose/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/evpose
-          FILES_MATCHING PATTERN "*.h")
+          FILES_MATCHING PATTERN "*.h" PATTERN "test_*.h" EXCLUDE)
 endforeach()
 install(TARGETS evpose_eigen evpose_hdf5 EXPORT evposeTargets)
 if(TARGET evpose)

@@ -2,6 +2,7 @@
 // Held against others: a second implementation in Python, and the published errors of released trajectories.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -138,7 +139,7 @@ TEST_P(PythonTwin, AgreesToItsPrintedDigits) {
   if (python.empty()) GTEST_SKIP() << "no Python with numpy: install python3-numpy";
 
   const std::string alignment = GetParam();
-  const fs::path folder = fs::path(testing::TempDir()) / ("evpose_eval_twin_" + alignment);
+  const fs::path folder = fs::path(testing::TempDir()) / ("evpose_eval_twin_" + std::to_string(::getpid()));
   fs::create_directories(folder);
   const std::string estimate_file = folder / "estimate.tum", truth_file = folder / "truth.tum";
   const Trajectories made = made_up();

@@ -2,6 +2,7 @@
 #include "evpose/sim/demo_recording.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <map>
@@ -46,9 +47,9 @@ class DemoRecording : public ::testing::Test {
     return all;
   }
 
+  // Of this process alone: tests run side by side.
   std::filesystem::path base_ =
-      std::filesystem::path(::testing::TempDir()) /
-      ("evpose_demo_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()));
+      std::filesystem::path(::testing::TempDir()) / ("evpose_demo_" + std::to_string(::getpid()));
   double last_share_ = 0;
 };
 

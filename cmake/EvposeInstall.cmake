@@ -12,7 +12,7 @@ foreach(module IN LISTS installed_modules)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/evpose/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/evpose
           FILES_MATCHING PATTERN "*.h" PATTERN "test_*.h" EXCLUDE)
 endforeach()
-install(TARGETS evpose_eigen evpose_hdf5 EXPORT evposeTargets)
+install(TARGETS evpose_eigen evpose_hdf5 evpose_lz4 evpose_zstd evpose_blosc EXPORT evposeTargets)
 if(TARGET evpose)
   install(TARGETS evpose)
 endif()

@@ -17,7 +17,11 @@ build=(
   libyaml-cpp-dev      # calibrations and configuration
   libcli11-dev         # command line
   nlohmann-json3-dev   # summary.json
-  libpng-dev           # pictures in the report
+  libpng-dev           # pictures in the report and in recordings
+  libbz2-dev liblz4-dev libzstd-dev libblosc-dev  # compressed bags, recordings and data sets
+  libsqlite3-dev       # ROS 2 bags
+  libembree-dev        # ray casting in the simulator
+  libassimp-dev        # meshes for the simulator
   nodejs npm           # fetch the report's plot library, once, while building
   ca-certificates      # for npm's https
 )
@@ -27,6 +31,8 @@ test=(
   python3              # layer and end-to-end tests
   python3-numpy        # the independent scorer
   python3-h5py         # makes broken recordings, reads our maps
+  python3-rosbag       # reads our ROS bags
+  clang-14 libclang-rt-14-dev  # fuzzing
   chromium             # draws the report
   clang-format-14      # pinned: each version formats differently
   clang-tidy-14        # pinned for the same reason

@@ -33,6 +33,10 @@ OUTSIDE = [
     ("HDF5", r"hdf5|H5", {"io"}),
     ("JSON", r"nlohmann/", FORMATS),
     ("libpng", r"png\.h", FORMATS),
+    ("compressors", r"(bzlib|lz4|lz4frame|zstd|blosc|zlib)\.h", {"io"}),
+    ("SQLite", r"sqlite3\.h", {"io"}),
+    ("Embree", r"embree3/", {"sim"}),
+    ("assimp", r"assimp/", {"sim"}),
     ("CLI11", r"CLI/", {"apps"}),
 ]
 # Opening files and printing.

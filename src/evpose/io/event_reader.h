@@ -22,6 +22,7 @@ struct EventReadOptions {
   bool swap_polarity = false;
   ImageSize size;         ///< for range checks and flips; 0x0: what the file says, if it does
   std::string time_unit;  ///< "us", "ns" or "s"; empty: the format's own
+  std::string topic;      ///< of bags and other files with several event streams; empty: the first
 };
 
 /// Of a whole file: its first and last stamp, offset added, nothing cropped.

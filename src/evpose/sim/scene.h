@@ -2,55 +2,81 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
-#include <optional>
+#include <functional>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "evpose/core/pose.h"
-#include "evpose/sim/ray_box.h"
-#include "evpose/sim/texture.h"
 
 namespace evpose::sim {
 
-/// A solid box that stands upright, or the hollow one that is the room.
-struct Box {
-  Pose T_map_box;              ///< of its middle; turned about z only
-  Eigen::Vector3d half;        ///< half extents, metres
-  std::vector<Texture> faces;  ///< by BoxSide
+class Texture;
+
+/// What a surface is made of. Surfaces scatter evenly (Lambert) and may shine by themselves.
+struct Material {
+  std::string name;
+  double reflectance = 0.5;                ///< 0 to 1; a factor of the texture where there is one
+  std::shared_ptr<const Texture> texture;  ///< none: plain
+  double emission_cd_m2 = 0;               ///< own light: sky, lamp, window pane
+  int emission_light = -1;                 ///< light whose switching and flicker it follows; -1: constant
 };
 
-/// Number of a face in the scene: six times the box plus the side.
-using Face = int;
-inline Face face_of(std::size_t box, BoxSide side) { return static_cast<Face>(6 * box) + side; }
-
-struct SceneHit {
-  double distance;  ///< in lengths of the ray's direction
-  Face face;
-  Eigen::Vector3d point;  ///< map frame, metres
+/// Triangles in the frame of their part, metres. Both sides are seen.
+struct Mesh {
+  using Corners = std::array<std::uint32_t, 3>;
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Corners> triangles;
+  std::vector<std::array<Eigen::Vector2f, 3>> uv;       ///< of each corner, metres on the texture
+  std::vector<std::array<Eigen::Vector3f, 3>> normals;  ///< of each corner, unit, map's or part's frame
+  std::vector<std::int32_t> material;                   ///< of each triangle
+  std::vector<std::int32_t> object;  ///< of each triangle: number of the thing it belongs to (Scene::objects)
 };
 
-/// Boxes in a box, one lamp and light from all sides. Map frame: z up, metres. boxes[0] is the room, seen
-/// from inside.
+/// How a light changes over time: a factor that is 1 without.
+struct LightSwitching {
+  double off_at_s = -1;      ///< from then on `off_factor`; negative: never
+  double on_at_s = -1;       ///< on again; negative: never
+  double off_factor = 0;     ///< what is left when off
+  double flicker_hz = 0;     ///< of the light itself: twice the mains
+  double flicker_depth = 0;  ///< 0 to 1: factor 1 + depth * sin
+  double factor(double t_s) const;
+};
+
+enum class LightKind : std::uint8_t { sun, lamp, ambient };
+
+struct Light {
+  std::string name;
+  LightKind kind = LightKind::ambient;
+  /// sun: lux on a surface that faces it; lamp: candela; ambient: lux on an open surface
+  double strength = 0;
+  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< sun: the way its light goes, map frame
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();     ///< lamp: metres, map frame
+  double radius = 0.1;  ///< lamp: metres; sun: rad, half its apparent size. Width of half shadows
+  LightSwitching switching;
+};
+
+/// A rigid thing that moves on its own, or one of its limbs.
+struct MovingPart {
+  std::string name;
+  Mesh mesh;                                   ///< in the part's frame
+  std::function<Pose(double t_s)> T_map_part;  ///< smooth; called from several threads
+};
+
+/// What the sensors see. Map frame: z up, metres.
 struct Scene {
-  std::vector<Box> boxes;
-  Eigen::Vector3d lamp = Eigen::Vector3d::Zero();
-  double lamp_power = 1;  ///< radiance of white paper that faces the lamp from one metre
-  double ambient = 0.2;   ///< radiance of white paper without the lamp
-
-  /// First surface along a ray; nothing if the ray starts outside of the room and misses it.
-  std::optional<SceneHit> trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
-  /// Inside a box or outside of the room.
-  bool solid(const Eigen::Vector3d& point) const;
-  /// Unit, map frame, out of the solid.
-  Eigen::Vector3d normal(Face face) const;
+  std::string name;
+  Mesh mesh;  ///< all that stands still, map frame
+  std::vector<Material> materials;
+  std::vector<Light> lights;
+  std::vector<MovingPart> moving;
+  std::vector<std::string> objects;  ///< names by Mesh::object; moving things have numbers of their own
+  double stray_light_cd_m2 = 1;      ///< scattered in the lens, added to every pixel
+  double sky_cd_m2 = 0;              ///< seen where a ray meets nothing
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< of the space that can be flown in
+  Eigen::Vector3d high = Eigen::Vector3d::Zero();
 };
-
-/// Axes of a face's texture: u runs level, v up (or along y on level faces).
-inline int texture_u_axis(BoxSide side) { return axis_of(side) == 0 ? 1 : 0; }
-inline int texture_v_axis(BoxSide side) { return axis_of(side) == 2 ? 1 : 2; }
-
-/// A furnished room of 6 x 5 x 3 m with a corner at the origin: table, crates, shelf, cupboard, pillar, beam.
-/// Boxes touch or stand apart, none cut each other. `seed` picks textures and tones, not shapes.
-Scene make_box_room(std::uint64_t seed);
 
 }  // namespace evpose::sim

@@ -1,28 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
-#include <functional>
 #include <vector>
+
+#include "evpose/sim/patterns.h"
 
 namespace evpose::sim {
 
-/// Reflectance over a rectangle, kept as a table of sums: its mean over any axis-parallel box takes the same
-/// few reads, so that a pixel integrates what it sees, however coarse or slanted, and nothing twinkles.
+/// Reflectance over a rectangle that repeats itself in both directions, kept at all scales, so that a pixel
+/// takes its mean over what it sees, however coarse or slanted, and nothing twinkles.
 class Texture {
  public:
-  /// `reflectance` in [0, 1] of (u, v) in metres from the lower left corner; sampled once per texel.
-  Texture(double width_m, double height_m, double texel_m,
-          const std::function<double(double u_m, double v_m)>& reflectance);
+  /// The pattern from (0, 0) to (width, height), sampled once per texel. A pattern that does not close at the
+  /// borders has a seam there, unseen where the surface is not larger than the rectangle.
+  Texture(double width_m, double height_m, double texel_m, const Pattern& pattern);
 
-  /// Mean over the box of size (width, height) around (u, v), metres; the box is at least a texel wide and is
-  /// cut at the rectangle's border.
-  double mean(double u_m, double v_m, double width_m, double height_m) const;
+  /// Mean around (u, v), metres, over the parallelogram spanned by `a` and `b`, metres.
+  float mean(float u_m, float v_m, const Eigen::Vector2f& a_m, const Eigen::Vector2f& b_m) const;
+
+  std::size_t bytes() const;
 
  private:
-  int columns_, rows_;
-  double texels_per_m_u_, texels_per_m_v_;
-  std::vector<std::int32_t> sums_;  ///< (columns + 1) x (rows + 1), in 1/255 of reflectance
+  struct Level {
+    int columns, rows;
+    std::vector<std::uint16_t> values;
+  };
+  float sample(const Level& level, float u, float v) const;
+
+  float width_, height_, texel_;
+  std::vector<Level> levels_;
 };
 
 }  // namespace evpose::sim

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "evpose/core/pose.h"
+#include "evpose/sim/scene.h"
+
+namespace evpose::sim {
+
+/// Where a ray meets a surface: origin + distance * direction.
+struct RayHit {
+  float distance;          ///< in lengths of the direction
+  std::int32_t part;       ///< -1: what stands still; else number in Scene::moving
+  std::uint32_t triangle;  ///< of the part's mesh
+};
+
+/// Rays in a scene, by Embree. May be used from several threads at once.
+class RayCaster {
+ public:
+  /// Keeps a reference.
+  explicit RayCaster(const Scene& scene);
+  ~RayCaster();
+
+  /// First surface in (near, far), lengths of `direction`, of what stands still. Map frame.
+  std::optional<RayHit> trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near = 0,
+                              float far = std::numeric_limits<float>::infinity()) const;
+  /// Moving parts too, as they stand at `t_s`.
+  std::optional<RayHit> trace_at(double t_s, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                 float near = 0, float far = std::numeric_limits<float>::infinity()) const;
+  /// One part alone, in its own frame.
+  std::optional<RayHit> trace_part(int part, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                   float near, float far) const;
+  /// True if what stands still covers the way.
+  bool blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near, float far) const;
+
+  const Scene& scene() const { return scene_; }
+
+ private:
+  struct Impl;
+  const Scene& scene_;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace evpose::sim

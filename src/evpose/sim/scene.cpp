@@ -1,15 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/sim/scene.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace evpose::sim {
 
 double LightSwitching::factor(double t_s) const {
-  const bool off = off_at_s >= 0 && t_s >= off_at_s && !(on_at_s >= off_at_s && t_s >= on_at_s);
-  const double level = off ? off_factor : 1.0;
+  // Share of a fade that began at `start`.
+  const auto done = [&](double start) {
+    if (start < 0) return 0.0;
+    return fade_s > 0 ? std::clamp((t_s - start) / fade_s, 0.0, 1.0) : (t_s >= start ? 1.0 : 0.0);
+  };
+  const double on = 1 - done(off_at_s) + (on_at_s > off_at_s ? done(on_at_s) : 0.0);
+  const double level = off_factor + (1 - off_factor) * on;
   return level * (1 + flicker_depth * std::sin(2 * std::numbers::pi * flicker_hz * t_s));
+}
+
+double LightSwitching::step_s(double t_s) const {
+  constexpr double kStepsAWave = 40, kStepsAFade = 16;
+  double step = flicker_depth > 0 ? 1 / (kStepsAWave * flicker_hz) : std::numeric_limits<double>::infinity();
+  for (const double start : {off_at_s, on_at_s}) {
+    if (start < 0 || t_s >= start + fade_s) continue;
+    step = std::min(step, std::max(fade_s / kStepsAFade, start - t_s));
+  }
+  return step;
 }
 
 }  // namespace evpose::sim

@@ -42,7 +42,13 @@ struct LightSwitching {
   double off_factor = 0;     ///< what is left when off
   double flicker_hz = 0;     ///< of the light itself: twice the mains
   double flicker_depth = 0;  ///< 0 to 1: factor 1 + depth * sin
+  double fade_s = 2e-3;      ///< how long going off or on takes
+
   double factor(double t_s) const;
+  /// Longest time step at `t_s` within which the factor changes evenly, about.
+  double step_s(double t_s) const;
+  bool constant() const { return off_at_s < 0 && flicker_depth == 0; }
+  bool operator==(const LightSwitching&) const = default;
 };
 
 enum class LightKind : std::uint8_t { sun, lamp, ambient };
@@ -73,7 +79,6 @@ struct Scene {
   std::vector<Light> lights;
   std::vector<MovingPart> moving;
   std::vector<std::string> objects;  ///< names by Mesh::object; moving things have numbers of their own
-  double stray_light_cd_m2 = 1;      ///< scattered in the lens, added to every pixel
   double sky_cd_m2 = 0;              ///< seen where a ray meets nothing
   Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< of the space that can be flown in
   Eigen::Vector3d high = Eigen::Vector3d::Zero();

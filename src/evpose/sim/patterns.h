@@ -9,17 +9,49 @@ namespace evpose::sim {
 /// Reflectance in [0, 1] at (u, v), metres; u runs along the face, v up or away.
 using Pattern = std::function<double(double u_m, double v_m)>;
 
-/// What the faces of a room are covered with. `mean`: average reflectance of the plain material; `seed` picks
-/// the marks. All have detail from a few millimetres to decimetres, none of it at the face's own edges.
-Pattern bricks(double mean, std::uint64_t seed);
-Pattern tiles(double mean, double tile_m, std::uint64_t seed);
-Pattern planks(double mean, double plank_m, std::uint64_t seed);
-Pattern plaster(double mean, std::uint64_t seed);
-Pattern cloth(double mean, std::uint64_t seed);
+/// The rectangle over which a pattern repeats itself, without a seam.
+struct Repeat {
+  double width_m = 4, height_m = 4;
+};
 
-/// Sheets of paper with headlines, pictures and lines of text, hung in a row over the `base`.
-Pattern posters(Pattern base, double width_m, double height_m, std::uint64_t seed);
-/// A printed carton: tape, a label with a bar code, a stencil.
-Pattern carton(double mean, double width_m, double height_m, std::uint64_t seed);
+// What the faces of a world are covered with: around 0.5 in the mean, with detail of all sizes from a few
+// millimetres to decimetres, irregular within a Repeat. `seed` picks the marks.
+
+// Walls, floors, ceilings (patterns.cpp).
+Pattern bricks(const Repeat& repeat, std::uint64_t seed);
+Pattern tiles(const Repeat& repeat, double tile_m, std::uint64_t seed);
+Pattern planks(const Repeat& repeat, double plank_m, std::uint64_t seed);
+Pattern plaster(const Repeat& repeat, std::uint64_t seed);
+Pattern wallpaper(const Repeat& repeat, std::uint64_t seed);
+Pattern ceiling_panels(const Repeat& repeat, std::uint64_t seed);
+Pattern marble(const Repeat& repeat, std::uint64_t seed);
+Pattern carpet(const Repeat& repeat, std::uint64_t seed);
+Pattern cloth(const Repeat& repeat, std::uint64_t seed);
+
+// Out of doors (patterns_outdoor.cpp).
+Pattern paving(const Repeat& repeat, std::uint64_t seed);
+Pattern asphalt(const Repeat& repeat, std::uint64_t seed);
+Pattern gravel(const Repeat& repeat, std::uint64_t seed);
+Pattern grass(const Repeat& repeat, std::uint64_t seed);
+Pattern concrete(const Repeat& repeat, std::uint64_t seed);
+Pattern stucco(const Repeat& repeat, std::uint64_t seed);
+Pattern graffiti(const Repeat& repeat, std::uint64_t seed);
+/// Panes `pane_m` wide and high with what is behind them: curtains, plants, the dark of a room.
+Pattern window_panes(const Repeat& repeat, double pane_m, std::uint64_t seed);
+
+// Printed things (patterns_print.cpp).
+/// A sheet of paper of the Repeat's size with headline, picture and lines of text.
+Pattern poster(const Repeat& repeat, std::uint64_t seed);
+/// Cartons: tape, labels with bar codes, stencilled words.
+Pattern carton(const Repeat& repeat, std::uint64_t seed);
+/// Backs of books side by side, each row `row_m` high.
+Pattern book_spines(const Repeat& repeat, double row_m, std::uint64_t seed);
+/// Lines of bright text on dark.
+Pattern screen_text(const Repeat& repeat, std::uint64_t seed);
+/// Painted sheet metal: ribs, big stencilled words, rust and scratches.
+Pattern container_side(const Repeat& repeat, std::uint64_t seed);
+
+/// The pattern with its contrasts (of the logarithm, about 0.5) times `factor`, kept within [0.02, 0.95].
+Pattern with_contrast(Pattern pattern, double factor);
 
 }  // namespace evpose::sim

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -94,16 +95,25 @@ class EventPixels {
     const float change = log_next - p.log_last;
     // Log luminance as linear and one time constant are good enough over small changes only.
     if (!(std::abs(change) < kSmallChange) || t1 >= p.wake) return false;
-    const double x = 1e-9 * static_cast<double>(t1 - t0) / time_constant_s(0.5 * (from + to) + dark_);
+    // Spans as time constants, and time constants as spans, with one division.
+    const double mean = 0.5 * (from + to) + dark_;
+    const double span = 1e-9 * static_cast<double>(t1 - t0) * mean;
+    const double tau = tau_fast_s_ * mean + tau_dim_s_;
+    const double inverse = 1 / (span * tau);
+    const double x = span * span * inverse;
     if (!(x > kShortest)) return false;
     // The share of a step that the low pass follows.
-    const double followed = x < 0.05 ? x * (1 - x * (1.0 / 2 - x * (1.0 / 6 - x * (1.0 / 24))))
-                                     : 1 - static_cast<double>(std::exp(static_cast<float>(-x)));
+    const double followed = x > 18     ? 1
+                            : x < 0.05 ? x * (1 - x * (1.0 / 2 - x * (1.0 / 6 - x * (1.0 / 24))))
+                                       : 1 - static_cast<double>(std::exp(static_cast<float>(-x)));
     const double behind = p.log_last - p.filtered;
-    const double behind_next = behind + (change / x - behind) * followed;
+    const double behind_next = behind + (change * tau * tau * inverse - behind) * followed;
     const double next = log_next - behind_next;
-    // Without a turn inside, the end is the extreme.
-    if (!(next < p.high && next > p.low) || (behind < 0) != (behind_next < 0)) return false;
+    if (!(next < p.high && next > p.low)) return false;
+    // Where it turns it meets the log luminance.
+    if ((behind < 0) != (behind_next < 0) &&
+        (std::max(p.log_last, log_next) >= p.high || std::min(p.log_last, log_next) <= p.low))
+      return false;
     p.filtered = next;
     p.log_last = log_next;
     return true;

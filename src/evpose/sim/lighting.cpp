@@ -213,6 +213,12 @@ double LightChannels::step_s(double t_s) const {
   return step;
 }
 
+double LightChannels::next_switch_s(double t_s) const {
+  double next = std::numeric_limits<double>::infinity();
+  for (const LightSwitching& s : switching) next = std::min(next, s.next_switch_s(t_s));
+  return next;
+}
+
 LightChannels light_channels(const Scene& scene) {
   LightChannels channels;
   channels.switching.emplace_back();

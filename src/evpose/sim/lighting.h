@@ -18,7 +18,8 @@ struct LightChannels {
   std::vector<int> of_light;              ///< channel of each light of the scene
 
   std::vector<float> factors(double t_s) const;
-  double step_s(double t_s) const;  ///< the shortest of LightSwitching::step_s
+  double step_s(double t_s) const;         ///< the shortest of LightSwitching::step_s
+  double next_switch_s(double t_s) const;  ///< the first of LightSwitching::next_switch_s
 };
 LightChannels light_channels(const Scene& scene);
 

@@ -23,10 +23,17 @@ double LightSwitching::step_s(double t_s) const {
   constexpr double kStepsAWave = 40, kStepsAFade = 16;
   double step = flicker_depth > 0 ? 1 / (kStepsAWave * flicker_hz) : std::numeric_limits<double>::infinity();
   for (const double start : {off_at_s, on_at_s}) {
-    if (start < 0 || t_s >= start + fade_s) continue;
-    step = std::min(step, std::max(fade_s / kStepsAFade, start - t_s));
+    if (start >= 0 && t_s >= start && t_s < start + fade_s) step = std::min(step, fade_s / kStepsAFade);
   }
   return step;
+}
+
+double LightSwitching::next_switch_s(double t_s) const {
+  double next = std::numeric_limits<double>::infinity();
+  for (const double start : {off_at_s, on_at_s}) {
+    if (start > t_s) next = std::min(next, start);
+  }
+  return next;
 }
 
 }  // namespace evpose::sim

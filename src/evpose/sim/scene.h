@@ -45,8 +45,9 @@ struct LightSwitching {
   double fade_s = 2e-3;      ///< how long going off or on takes
 
   double factor(double t_s) const;
-  /// Longest time step at `t_s` within which the factor changes evenly, about.
+  /// Longest time step from `t_s` on, up to the next switch, within which the factor changes evenly, about.
   double step_s(double t_s) const;
+  double next_switch_s(double t_s) const;  ///< after `t_s`; infinite: none
   bool constant() const { return off_at_s < 0 && flicker_depth == 0; }
   bool operator==(const LightSwitching&) const = default;
 };

@@ -452,6 +452,8 @@ void describe(ConfigTable& table, FilmConfig& config) {
   table.add("step_px", config.step_px, "px", "motion of the picture between two samples", {0.05, 2});
   table.add("block_px", config.block_px, "px", "motion between two looks at which surface is where", {1, 8});
   table.add("block_s", config.block_s, "s", "longest time between two such looks", {1e-4, 0.1});
+  table.add("fastest_px_s", config.fastest_px_s, "px/s", "flights that move the picture faster are refused",
+            {1, 1e6});
   table.add("veiling_glare", config.veiling_glare, "",
             "share of the picture's mean luminance that the lens scatters over all of it", {0, 1});
 }

@@ -23,6 +23,7 @@ struct FilmConfig {
   double step_px = 0.5;         ///< motion of the picture between two samples of a tile
   double block_px = 5;          ///< ... between two looks at which surface is where
   double block_s = 0.01;        ///< longest time between these
+  double fastest_px_s = 20000;  ///< flights that move the picture faster are refused
   double veiling_glare = 0.02;  ///< share of the picture's mean luminance that the lens scatters over it
 };
 void describe(ConfigTable& table, FilmConfig& config);

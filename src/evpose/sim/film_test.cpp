@@ -27,13 +27,15 @@ EventCameraConfig ideal_pixels() {
 // A film of a scene, from a camera that moves evenly without turning.
 struct Shot {
   Shot(const Scene& of, const Eigen::Vector3d& from, const Eigen::Vector3d& by)
-      : scene(of), start(from), velocity(by) {}
+      : scene(of), start(from), velocity(by) {
+    film.veiling_glare = 0;
+  }
 
   Scene scene;
   Eigen::Vector3d start, velocity;
   std::shared_ptr<const Camera> camera = test_camera(64, 48, kFocal);
   EventCameraConfig pixels = ideal_pixels();
-  FilmConfig film{0.5, 5, 0.01, 0};
+  FilmConfig film;
   double duration_s = 0.05;
   int threads = 1;
   std::vector<Exposure*> exposures;

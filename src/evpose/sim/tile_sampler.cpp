@@ -174,6 +174,21 @@ float TileSampler::scan(const PixelRay& ray, const std::array<Hit, 5>& hits) {
   return sum / kScanLines;
 }
 
+// True if there is a step of depth or direction between two hits. What is stuck to a wall is print.
+bool TileSampler::parted(const Hit& a, const Hit& b, const PixelRay& ray) const {
+  constexpr double kSameNormal = 0.9998, kPrint_m = 2e-3;
+  if (a.group == b.group) return false;
+  if (a.group == kSky || b.group == kSky || a.part != b.part) return true;
+  const Patch &p = stage_.surfaces_of(a.part).patches[a.patch],
+              &q = stage_.surfaces_of(b.part).patches[b.patch];
+  if (p.surface == q.surface) return false;
+  if (p.normal.dot(q.normal) < kSameNormal) return true;
+  // Distance of b's point from a's plane.
+  const Pose& T_part_cam = a.part < 0 ? view_->T_map_cam : view_->T_part_cam[a.part];
+  const Eigen::Vector3d point = T_part_cam * (b.depth * ray.direction(b.at.x(), b.at.y())).cast<double>();
+  return std::abs(p.normal.dot(point) + p.offset) > kPrint_m;
+}
+
 void TileSampler::sample_open(int x, int y, PixelSample& out) {
   const PixelRay& r = ray(plan_->tile.x0 + x, plan_->tile.y0 + y);
   movers_.clear();
@@ -196,10 +211,7 @@ void TileSampler::sample_open(int x, int y, PixelSample& out) {
     out.luminance = shade(hits[0], r, 0, 0);
     return;
   }
-  const auto surface = [&](const Hit& hit) {
-    return hit.group == kSky ? kSky : stage_.surfaces_of(hit.part).patches[hit.patch].surface;
-  };
-  for (const Hit& hit : hits) out.outline = out.outline || surface(hit) != surface(hits[0]);
+  for (const Hit& hit : hits) out.outline = out.outline || parted(hits[0], hit, r);
   out.other = other;
   if (other == kMany || !split(r, hits, out)) {
     out.other = kMany;

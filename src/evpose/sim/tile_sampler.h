@@ -107,6 +107,7 @@ class TileSampler {
   bool split(const PixelRay& ray, const std::array<Hit, 5>& hits, PixelSample& out);
   bool separates(const Border& border, const PixelRay& ray, const std::array<Hit, 5>& hits,
                  PixelSample& out) const;
+  bool parted(const Hit& a, const Hit& b, const PixelRay& ray) const;
   float scan(const PixelRay& ray, const std::array<Hit, 5>& hits);
   void describe_hit(const Hit& hit, PixelSample& out) const;
 

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+
+#include "evpose/core/error.h"
+#include "evpose/sim/film.h"
+
+namespace evpose::sim {
+
+/// Looks along a flight before it is rendered. Errors, with the time: the camera is inside of something or
+/// nearer than 3 cm to it; the picture would move faster than `fastest_px_s`.
+Status check_flight(const RayCaster& rays, const Film::Path& path, double duration_s, double focal_px,
+                    double fastest_px_s);
+
+}  // namespace evpose::sim

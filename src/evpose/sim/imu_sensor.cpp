@@ -24,8 +24,8 @@ Vector3d normal(Random& random, double sigma) {
 }
 
 // Data sheets of the ICM-20689 and the ADIS16448; walks, and biases after a start on the ground, as usual.
-ImuSensorConfig preset(ImuPreset which) {
-  ImuSensorConfig c;
+ImuConfig preset(ImuPreset which) {
+  ImuConfig c;
   c.preset = which;
   c.accel_density = c.accel_walk = c.gyro_density = c.gyro_walk = c.accel_bias = c.gyro_bias = 0;
   c.accel_scale = c.gyro_scale = c.accel_misalignment_deg = c.gyro_misalignment_deg = 0;
@@ -60,7 +60,7 @@ Vector3d limited_and_rounded(const Vector3d& value, double range, double step) {
 /// The shaking at a time; its phases are drawn once.
 class Lines {
  public:
-  Lines(const ImuSensorConfig& config, std::uint64_t seed) : lines_(config.lines) {
+  Lines(const ImuConfig& config, std::uint64_t seed) : lines_(config.lines) {
     Random random(seed, kLines);
     for (auto& phases : phases_)
       for (double& phase : phases) phase = random.uniform(0, 2 * std::numbers::pi);
@@ -90,7 +90,7 @@ void describe(ConfigTable& table, ImuVibrationLine& line) {
     table.add(text("gyro_", axes[i], "_deg_s"), line.gyro_deg_s[i], "deg/s", "amplitude", {0, 1e4});
 }
 
-void describe(ConfigTable& table, ImuSensorConfig& c) {
+void describe(ConfigTable& table, ImuConfig& c) {
   table.add("preset", c.preset,
             ConfigTable::Choices<ImuPreset>{
                 {"ideal", ImuPreset::ideal}, {"pixhawk", ImuPreset::pixhawk}, {"adis", ImuPreset::adis}},
@@ -118,16 +118,15 @@ void describe(ConfigTable& table, ImuSensorConfig& c) {
   table.group("line_2", c.lines[1]);
 }
 
-ImuSensorConfig resolve(const ImuSensorConfig& config) {
-  const ImuSensorConfig own = preset(config.preset);
-  ImuSensorConfig out = config;
+ImuConfig resolve(const ImuConfig& config) {
+  const ImuConfig own = preset(config.preset);
+  ImuConfig out = config;
   for (const auto member :
-       {&ImuSensorConfig::accel_density, &ImuSensorConfig::accel_walk, &ImuSensorConfig::gyro_density,
-        &ImuSensorConfig::gyro_walk, &ImuSensorConfig::accel_bias, &ImuSensorConfig::gyro_bias,
-        &ImuSensorConfig::accel_scale, &ImuSensorConfig::gyro_scale, &ImuSensorConfig::accel_misalignment_deg,
-        &ImuSensorConfig::gyro_misalignment_deg, &ImuSensorConfig::accel_range_m_s2,
-        &ImuSensorConfig::gyro_range_deg_s, &ImuSensorConfig::accel_step_m_s2,
-        &ImuSensorConfig::gyro_step_deg_s, &ImuSensorConfig::jitter_us})
+       {&ImuConfig::accel_density, &ImuConfig::accel_walk, &ImuConfig::gyro_density, &ImuConfig::gyro_walk,
+        &ImuConfig::accel_bias, &ImuConfig::gyro_bias, &ImuConfig::accel_scale, &ImuConfig::gyro_scale,
+        &ImuConfig::accel_misalignment_deg, &ImuConfig::gyro_misalignment_deg, &ImuConfig::accel_range_m_s2,
+        &ImuConfig::gyro_range_deg_s, &ImuConfig::accel_step_m_s2, &ImuConfig::gyro_step_deg_s,
+        &ImuConfig::jitter_us})
     if (out.*member < 0) out.*member = own.*member;
   return out;
 }
@@ -136,8 +135,8 @@ ImuSample ideal_imu(const Motion& motion, TimeNs t) {
   return {t, motion.rate, motion.T_map_body.q.conjugate() * (motion.acceleration - gravity_map())};
 }
 
-ImuFaults draw_faults(const ImuSensorConfig& config, std::uint64_t seed) {
-  const ImuSensorConfig c = resolve(config);
+ImuFaults draw_faults(const ImuConfig& config, std::uint64_t seed) {
+  const ImuConfig c = resolve(config);
   Random random(seed, kFaults);
   const auto matrix = [&](double scale, double misalignment) {
     Eigen::Matrix3d m;
@@ -154,9 +153,9 @@ ImuFaults draw_faults(const ImuSensorConfig& config, std::uint64_t seed) {
   return faults;
 }
 
-std::vector<ImuSample> simulate_imu(const Trajectory& trajectory, TimeNs duration,
-                                    const ImuSensorConfig& config, std::uint64_t seed) {
-  const ImuSensorConfig c = resolve(config);
+std::vector<ImuSample> simulate_imu(const Trajectory& trajectory, TimeNs duration, const ImuConfig& config,
+                                    std::uint64_t seed) {
+  const ImuConfig c = resolve(config);
   const ImuFaults faults = draw_faults(config, seed);
   Random gyro_noise(seed, kGyroNoise), accel_noise(seed, kAccelNoise), jitter(seed, kJitter);
   Random gyro_walk(seed, kGyroWalk), accel_walk(seed, kAccelWalk);
@@ -186,8 +185,8 @@ std::vector<ImuSample> simulate_imu(const Trajectory& trajectory, TimeNs duratio
   }
 }
 
-ImuNoise noise_model(const ImuSensorConfig& config) {
-  const ImuSensorConfig c = resolve(config);
+ImuNoise imu_noise(const ImuConfig& config) {
+  const ImuConfig c = resolve(config);
   // A filter divides by these.
   ImuNoise noise;
   noise.accel_density = std::max(c.accel_density, 1e-4);

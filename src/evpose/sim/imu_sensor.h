@@ -29,7 +29,7 @@ struct ImuVibrationLine {
 void describe(ConfigTable& table, ImuVibrationLine& line);
 
 /// Values below zero are the preset's own.
-struct ImuSensorConfig {
+struct ImuConfig {
   ImuPreset preset = ImuPreset::pixhawk;
   double rate_hz = 200;
   double accel_density = -1;                 ///< m/s^2/sqrt(Hz)
@@ -46,10 +46,10 @@ struct ImuSensorConfig {
   double jitter_us = -1;  ///< of the stamps, 1 sigma, up to 0.45 of the interval
   std::array<ImuVibrationLine, 2> lines;
 };
-void describe(ConfigTable& table, ImuSensorConfig& config);
+void describe(ConfigTable& table, ImuConfig& config);
 
 /// The config with every value of the preset put in.
-ImuSensorConfig resolve(const ImuSensorConfig& config);
+ImuConfig resolve(const ImuConfig& config);
 
 /// What a faultless IMU reads.
 ImuSample ideal_imu(const Motion& motion, TimeNs t);
@@ -59,13 +59,13 @@ struct ImuFaults {
   Eigen::Matrix3d accel_matrix, gyro_matrix;  ///< reading = matrix * truth + bias + noise
   Eigen::Vector3d accel_bias, gyro_bias;      ///< at time 0
 };
-ImuFaults draw_faults(const ImuSensorConfig& config, std::uint64_t seed);
+ImuFaults draw_faults(const ImuConfig& config, std::uint64_t seed);
 
 /// Readings at equal intervals from time 0 to `duration` inclusive, stamped with offset and jitter, in order.
-std::vector<ImuSample> simulate_imu(const Trajectory& trajectory, TimeNs duration,
-                                    const ImuSensorConfig& config, std::uint64_t seed);
+std::vector<ImuSample> simulate_imu(const Trajectory& trajectory, TimeNs duration, const ImuConfig& config,
+                                    std::uint64_t seed);
 
 /// What a filter is told of the sensor: the densities, above zero even where the sensor is ideal.
-ImuNoise noise_model(const ImuSensorConfig& config);
+ImuNoise imu_noise(const ImuConfig& config);
 
 }  // namespace evpose::sim

@@ -23,8 +23,8 @@ Trajectory flight(TrajectoryKind kind) {
   return make_trajectory(c).value();
 }
 
-ImuSensorConfig ideal(double rate_hz) {
-  ImuSensorConfig c;
+ImuConfig ideal(double rate_hz) {
+  ImuConfig c;
   c.preset = ImuPreset::ideal;
   c.rate_hz = rate_hz;
   return c;
@@ -47,12 +47,12 @@ double allan(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSample::*
 TEST(ImuSensor, AllanDeviationAtRestIsThatOfTheDensities) {
   for (const ImuPreset preset : {ImuPreset::pixhawk, ImuPreset::adis}) {
     const double rate_hz = 100;
-    ImuSensorConfig white;
+    ImuConfig white;
     white.preset = preset;
     white.rate_hz = rate_hz;
     white.accel_step_m_s2 = white.gyro_step_deg_s = 0;
-    const ImuNoise noise = noise_model(white);
-    ImuSensorConfig walk = white;
+    const ImuNoise noise = imu_noise(white);
+    ImuConfig walk = white;
     white.accel_walk = white.gyro_walk = 0;
     walk.accel_density = walk.gyro_density = 0;
     const auto white_samples = simulate_imu(rest(), 3000 * kNsPerS, white, 1);
@@ -96,7 +96,7 @@ TEST(ImuSensor, StrapdownOfTheIdealImuFollowsASpiral) {
 
 TEST(ImuSensor, ReadingsAreMatrixTimesTruthPlusBias) {
   const Trajectory trajectory = flight(TrajectoryKind::lissajous);
-  ImuSensorConfig c = ideal(200);
+  ImuConfig c = ideal(200);
   c.accel_scale = 0.02, c.gyro_scale = 0.03, c.accel_misalignment_deg = 1, c.gyro_misalignment_deg = 2;
   c.accel_bias = 0.1, c.gyro_bias = 0.01;
   const ImuFaults faults = draw_faults(c, 7);
@@ -110,7 +110,7 @@ TEST(ImuSensor, ReadingsAreMatrixTimesTruthPlusBias) {
 }
 
 TEST(ImuSensor, FaultsSpreadAsConfigured) {
-  ImuSensorConfig c = ideal(200);
+  ImuConfig c = ideal(200);
   c.gyro_scale = 0.03, c.gyro_misalignment_deg = 2, c.gyro_bias = 0.01;
   double scale = 0, misalignment = 0, bias = 0;
   constexpr int kCount = 2000;
@@ -129,7 +129,7 @@ TEST(ImuSensor, FaultsSpreadAsConfigured) {
 
 TEST(ImuSensor, ReadingsSaturateAtTheRange) {
   const Trajectory trajectory = flight(TrajectoryKind::aggressive);
-  ImuSensorConfig c = ideal(500);
+  ImuConfig c = ideal(500);
   c.accel_range_m_s2 = 9.9;
   c.gyro_range_deg_s = 20;
   int full = 0;
@@ -145,7 +145,7 @@ TEST(ImuSensor, ReadingsSaturateAtTheRange) {
 }
 
 TEST(ImuSensor, ReadingsAreWholeSteps) {
-  ImuSensorConfig c = ideal(100);
+  ImuConfig c = ideal(100);
   c.gyro_density = 1e-3, c.gyro_step_deg_s = 0.5, c.accel_density = 0.01, c.accel_step_m_s2 = 0.25;
   for (const ImuSample& s : simulate_imu(rest(), kNsPerS, c, 1))
     for (int axis = 0; axis < 3; ++axis) {
@@ -157,14 +157,14 @@ TEST(ImuSensor, ReadingsAreWholeSteps) {
 
 TEST(ImuSensor, OffsetStampIsLateByTheOffset) {
   const Trajectory trajectory = flight(TrajectoryKind::square_spiral);
-  ImuSensorConfig c = ideal(200);
+  ImuConfig c = ideal(200);
   c.time_offset_s = 0.004;
   for (const ImuSample& s : simulate_imu(trajectory, kNsPerS, c, 1))
     EXPECT_LT((s.gyro - trajectory.at(to_seconds(s.t) - 0.004).rate).norm(), 1e-12);
 }
 
 TEST(ImuSensor, JitterOfTheStampsIsAsGivenAndKeepsTheirOrder) {
-  ImuSensorConfig c = ideal(1000);
+  ImuConfig c = ideal(1000);
   c.jitter_us = 40;
   double sum = 0, squares = 0;
   const auto samples = simulate_imu(rest(), 20 * kNsPerS, c, 1);
@@ -182,7 +182,7 @@ TEST(ImuSensor, JitterOfTheStampsIsAsGivenAndKeepsTheirOrder) {
 }
 
 TEST(ImuSensor, VibrationLineHasItsFrequencyAndAmplitudePerAxis) {
-  ImuSensorConfig c = ideal(1000);
+  ImuConfig c = ideal(1000);
   c.lines[1].frequency_hz = 83;
   c.lines[1].accel_m_s2 = {1, 2, 3};
   c.lines[1].gyro_deg_s = {0, 5, 0};
@@ -203,23 +203,23 @@ TEST(ImuSensor, VibrationLineHasItsFrequencyAndAmplitudePerAxis) {
 }
 
 TEST(ImuSensor, OverridesStandAndTheRestIsThePresets) {
-  ImuSensorConfig c;
+  ImuConfig c;
   ConfigTable table;
   table.group("imu", c);
   ASSERT_TRUE(table.set("imu.preset", "adis", "test"));
   ASSERT_TRUE(table.set("imu.gyro_density", "0.5", "test"));
   ASSERT_TRUE(table.set("imu.line_2.gyro_y_deg_s", "3", "test"));
   EXPECT_FALSE(table.set("imu.rate_hz", "0", "test"));
-  const ImuSensorConfig r = resolve(c);
+  const ImuConfig r = resolve(c);
   EXPECT_EQ(r.gyro_density, 0.5);
   EXPECT_EQ(r.gyro_range_deg_s, 1000);
   EXPECT_EQ(r.lines[1].gyro_deg_s[1], 3);
-  EXPECT_EQ(noise_model(c).gyro_density, 0.5);
-  EXPECT_GT(noise_model(ideal(200)).accel_density, 0);
+  EXPECT_EQ(imu_noise(c).gyro_density, 0.5);
+  EXPECT_GT(imu_noise(ideal(200)).accel_density, 0);
 }
 
 TEST(ImuSensor, SameSeedSameReadingsAndASettingLeavesOthersAlone) {
-  ImuSensorConfig c;
+  ImuConfig c;
   const auto one = simulate_imu(rest(), kNsPerS, c, 5), same = simulate_imu(rest(), kNsPerS, c, 5);
   c.accel_density = 0.1;
   const auto other = simulate_imu(rest(), kNsPerS, c, 5);

@@ -50,17 +50,20 @@ struct Frame {
   Eigen::Vector3d corner, along_u, along_v, normal;  // unit directions; along_v as the face has it
   double width, height;
   Eigen::Vector2d v_on_texture;  // unit; (0, 1) in a rectangle
+  bool turned = false;           // the texture by a quarter
 
-  explicit Frame(const Face& face)
+  explicit Frame(const Face& face, bool along_grain = false)
       : corner(face.corner),
         along_u(face.u.normalized()),
         along_v(face.v.normalized()),
         normal(face.u.cross(face.v).normalized()),
         width(face.u.norm()),
         height(face.v.norm()),
-        v_on_texture(along_u.dot(along_v), along_u.cross(along_v).norm()) {}
+        v_on_texture(along_u.dot(along_v), along_u.cross(along_v).norm()),
+        turned(along_grain && height > width) {}
   Corner at(double u, double v) const {
-    return {corner + u * along_u + v * along_v, normal, Eigen::Vector2d(u, 0) + v * v_on_texture};
+    const Eigen::Vector2d uv = Eigen::Vector2d(u, 0) + v * v_on_texture;
+    return {corner + u * along_u + v * along_v, normal, turned ? Eigen::Vector2d(uv.y(), -uv.x()) : uv};
   }
 };
 
@@ -112,7 +115,7 @@ void add_reveal(Mesh& mesh, const Frame& frame, const Opening& o, double depth, 
 }  // namespace
 
 void add_face(Mesh& mesh, const Face& face, const Finish& finish) {
-  const Frame f(face);
+  const Frame f(face, finish.along_grain);
   add_quad(mesh, {f.at(0, 0), f.at(f.width, 0), f.at(f.width, f.height), f.at(0, f.height)}, finish);
 }
 

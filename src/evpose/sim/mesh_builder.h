@@ -15,6 +15,7 @@ struct Finish {
   std::int32_t material = 0;
   std::int32_t object = 0;
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< texture coordinates of the face's first corner, metres
+  bool along_grain = false;                      ///< the texture's u runs along each face's longer side
 };
 
 /// A parallelogram from `corner` along `u` and `v`, metres. Its outside is where u x v points; the texture's

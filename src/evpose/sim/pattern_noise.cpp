@@ -13,10 +13,10 @@ struct Lattice {
   double rest;
 };
 Lattice lattice(double x, int count) {
-  const double floor = std::floor(x);
-  int low = static_cast<int>(std::fmod(floor, count));
-  if (low < 0) low += count;
-  return {low, low + 1 == count ? 0 : low + 1, x - floor};
+  double round = x - count * std::floor(x / count);
+  if (round >= count) round = 0;  // by rounding
+  const int low = static_cast<int>(round);
+  return {low, low + 1 == count ? 0 : low + 1, round - low};
 }
 
 int cells(double length_m, double cell_m) {

@@ -31,9 +31,11 @@ struct CellRow {
     double offset_m;  ///< from the cell's start
   };
   Cell at(double x_m) const {
-    const double place = std::floor(x_m / size_m);
-    const int index = static_cast<int>(std::fmod(place, count));
-    return {index < 0 ? index + count : index, x_m - place * size_m};
+    const double place = x_m / size_m;
+    double round = place - count * std::floor(place / count);
+    if (round >= count) round = 0;  // by rounding
+    const int index = static_cast<int>(round);
+    return {index, (round - index) * size_m};
   }
 };
 

@@ -97,7 +97,7 @@ Pattern graffiti(const Repeat& repeat, std::uint64_t seed) {
   return [=](double u, double v) {
     const auto i = us.at(u), j = vs.at(v);
     const double pick = cell_value(i.index, j.index, seed);
-    if (pick < 0.4) return wall(u, v);
+    if (pick < 0.72) return wall(u, v);
     const double x = i.offset_m / us.size_m + 0.05 * swell(u, v),
                  y = j.offset_m / vs.size_m + 0.06 * sway(u, v);
     const auto mark = mix(seed + static_cast<std::uint64_t>(i.index * 97 + j.index));
@@ -109,7 +109,7 @@ Pattern graffiti(const Repeat& repeat, std::uint64_t seed) {
       if (letter_ink(place - letter - 0.1, rise + 0.06, which)) return 0.06;
     }
     const double shape = shapes(u, v) + 0.2 * mist(u, v);
-    if (pick > 0.65 && shape > 0.25) return 0.14 + 0.5 * pick * (mist(u, v) > 0);
+    if (pick > 0.85 && shape > 0.25) return 0.14 + 0.5 * pick * (mist(u, v) > 0);
     return wall(u, v);
   };
 }

@@ -187,6 +187,22 @@ Status write_ply_contours(const std::string& path, const ContourMap& map) {
   return file->commit();
 }
 
+Status write_ply_cloud(const std::string& path, const std::vector<CloudPoint>& points) {
+  auto file = AtomicFile::create(path);
+  if (!file) return file.error();
+  file->write(header("cloud, map frame, metres", points.size()) + properties("float", {"x", "y", "z"}) +
+              properties("uchar", {"intensity"}) + properties("ushort", {"scan"}) + "end_header\n");
+  std::string row;
+  for (const CloudPoint& point : points) {
+    row.clear();
+    put(row, point.position);
+    put(row, point.intensity);
+    put(row, point.scan);
+    file->write(row);
+  }
+  return file->commit();
+}
+
 Status write_ply_points(const std::string& path, const std::vector<Eigen::Vector3d>& points) {
   auto file = AtomicFile::create(path);
   if (!file) return file.error();

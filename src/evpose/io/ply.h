@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,15 @@ Expected<TriangleMesh> read_ply_mesh(const std::string& path, const Eigen::Vecto
 
 /// contours.ply with every property of formats 2.1 that ContourMap holds.
 Status write_ply_contours(const std::string& path, const ContourMap& map);
+
+/// A point as a LiDAR gives it.
+struct CloudPoint {
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< map frame, metres
+  std::uint8_t intensity = 0;                          ///< reflectance, 255 is white
+  std::uint16_t scan = 0;                              ///< number of the scan
+};
+/// x y z as floats, intensity, scan.
+Status write_ply_cloud(const std::string& path, const std::vector<CloudPoint>& points);
 
 /// x y z as floats.
 Status write_ply_points(const std::string& path, const std::vector<Eigen::Vector3d>& points);

@@ -62,6 +62,7 @@ void describe(ConfigTable& table, TrajectoryConfig& c) {
   table.add("rate_deg_s", c.rate_deg_s, "deg/s", "fastest turning without vibration; -1: the kind's own",
             {-1, 1000});
   table.add("sway_deg", c.sway_deg, "deg", "amplitude of turning to and fro; -1: the kind's own", {-1, 60});
+  table.add("turn_deg_s", c.turn_deg_s, "deg/s", "steady turning to the left", {-1000, 1000});
   table.add("bank", c.bank, "", "share of the tilt that acceleration asks of a multicopter", {0, 1});
   table.add("start_height_m", c.start_height_m, "m", "landing: start above the pad's top", {0, 1000});
   table.add("start_forward_m", c.start_forward_m, "m", "landing: start ahead of the pad", {-kFar, kFar});

@@ -64,8 +64,9 @@ struct TrajectoryConfig {
   double heading_deg = 0;                                         ///< from +x to the left
   double speed_m_s = -1;                                          ///< fastest
   double rate_deg_s = -1;                                         ///< fastest, without vibration
-  double sway_deg = -1;  ///< amplitude of the slow turning to and fro
-  double bank = 0.5;     ///< share of the tilt that a multicopter's acceleration asks for
+  double sway_deg = -1;   ///< amplitude of the slow turning to and fro
+  double turn_deg_s = 0;  ///< steady turning to the left
+  double bank = 0.5;      ///< share of the tilt that a multicopter's acceleration asks for
   double start_height_m = 6, start_forward_m = 0, start_left_m = 0;  ///< landing: start above the pad's top
   double end_height_m = 0.25;                                        ///< landing: end above it
   double wind_m = 0.08;  ///< landing: 1 sigma of the sideways disturbance

@@ -393,7 +393,7 @@ PoseSpline spline_of(const Plan& plan, const TrajectoryConfig& c, const Values& 
   for (std::size_t k = 0; k < count; ++k) {
     const double t = flight_time(kKnot_s * static_cast<double>(k), rest_s);
     position[k] = plan.position(t);
-    yaw[k] = plan.yaw ? plan.yaw(t) : heading;
+    yaw[k] = (plan.yaw ? plan.yaw(t) : heading) + kDegree * c.turn_deg_s * t;
     turn[k] = sway(t);
   }
   if (has_corners(c.kind))

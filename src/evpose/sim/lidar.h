@@ -21,7 +21,7 @@ namespace evpose::sim {
 struct LidarConfig {
   LidarConfig();
 
-  bool on = true;
+  bool on = false;
   double points_per_s = 200000;
   int keep_every = 4;                 ///< of the points, one in so many is kept
   double scan_s = 0.1;                ///< points with one registration error

@@ -17,7 +17,7 @@
 #include "evpose/io/trajectory_tum.h"
 #include "evpose/sim/flight_check.h"
 #include "evpose/sim/scene_contours.h"
-#include "evpose/sim/scene_file.h"
+#include "evpose/sim/view.h"
 
 namespace evpose::sim {
 namespace {
@@ -39,8 +39,7 @@ void switch_lamps(const LampConfig& lamps, Scene& scene) {
 }
 
 Expected<Scene> make_scene(const Scenario& scenario, ThreadPool& pool) {
-  auto scene = scenario.scene_file.empty() ? make_world(scenario.world, pool)
-                                           : read_scene(scenario.scene_file, scenario.world, pool);
+  auto scene = make_world(scenario.world, pool);
   if (scene) switch_lamps(scenario.lamps, *scene);
   return scene;
 }
@@ -168,7 +167,7 @@ Status Maker::write_small_files(const Trajectory& trajectory) {
 }
 
 Status Maker::write_map(const Scene& scene, const RayCaster& rays) {
-  const ContourMap contours = make_contours(scene, rays, scenario_.truth.contour_spacing_m);
+  const ContourMap contours = make_contours(scene, rays, scenario_.truth.contour_spacing_m, pool_);
   counts_.contour_points = contours.points.size();
   if (Status done = write_ply_contours(folder_.path("contours.ply"), contours); !done) return done;
   return write_ply_mesh(folder_.path("mesh.ply"), contours.occluders, contours.anchor);
@@ -232,7 +231,7 @@ Expected<RecordingCounts> Maker::make() {
   if (Status done = write_small_files(*trajectory); !done) return done.error();
   if (Status done = write_map(*scene, look); !done) return done.error();
   if (Status done = write_lidar(folder_.path("map_raw.ply"), look, scenario_.lidar,
-                                static_cast<std::uint64_t>(scenario_.seed));
+                                static_cast<std::uint64_t>(scenario_.seed), pool_);
       !done)
     return done.error();
   if (Status done = write_depth(folder_, stage, *rays, (*camera)->size(), T_map_cam, scenario_.depth,

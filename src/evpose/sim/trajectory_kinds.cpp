@@ -10,6 +10,7 @@
 #include "evpose/io/waypoints.h"
 #include "evpose/sim/random.h"
 #include "evpose/sim/trajectory.h"
+#include "evpose/sim/trajectory_curves.h"
 
 namespace evpose::sim {
 namespace {
@@ -80,106 +81,9 @@ std::function<Vector3d(const Vector3d&)> volume_to_map(const TrajectoryConfig& c
   return [centre, q](const Vector3d& p) -> Vector3d { return centre + q * p; };
 }
 
-double fastest(const std::function<Vector3d(double)>& position, double duration_s) {
-  constexpr int kSteps = 4000;
-  const double step = duration_s / kSteps;
-  double most = 0;
-  Vector3d before = position(0);
-  for (int i = 1; i <= kSteps; ++i) {
-    const Vector3d now = position(step * i);
-    most = std::max(most, (now - before).norm() / step);
-    before = now;
-  }
-  return most;
-}
-
-/// Travels a curve so fast that its fastest moment has the speed: curve(pace * t).
-std::function<Vector3d(double)> at_top_speed(std::function<Vector3d(double)> curve, double speed_m_s,
-                                             double duration_s) {
-  double low = 0, high = 1e3;
-  for (int i = 0; i < 60; ++i) {
-    const double pace = 0.5 * (low + high);
-    const bool too_fast = fastest([&](double t) { return curve(pace * t); }, duration_s) > speed_m_s;
-    (too_fast ? high : low) = pace;
-  }
-  return [curve = std::move(curve), pace = low](double t) { return curve(pace * t); };
-}
-
-/// Travels a curve at constant speed. Tabulated over what the duration needs; holds at `end`.
-std::function<Vector3d(double)> at_constant_speed(const std::function<Vector3d(double)>& curve,
-                                                  double speed_m_s, double duration_s, double end) {
-  constexpr double kStep_s = 1e-3;
-  constexpr double kDifference = 1e-5;
-  std::vector<double> parameter = {0};
-  while (static_cast<double>(parameter.size()) * kStep_s < duration_s + 1 && parameter.back() < end) {
-    const auto slope = [&](double a) {
-      return speed_m_s / ((curve(a + kDifference) - curve(a - kDifference)).norm() / (2 * kDifference));
-    };
-    const double a = parameter.back(), middle = a + 0.5 * kStep_s * slope(a);
-    parameter.push_back(std::min(end, a + kStep_s * slope(middle)));
-  }
-  return [curve, parameter = std::move(parameter)](double t) {
-    const double place = std::clamp(t / kStep_s, 0.0, static_cast<double>(parameter.size() - 1));
-    const auto i = std::min(static_cast<std::size_t>(place), parameter.size() - 1);
-    const auto j = std::min(i + 1, parameter.size() - 1);
-    return curve(std::lerp(parameter[i], parameter[j], place - static_cast<double>(i)));
-  };
-}
-
-/// Some slow waves of random frequency and phase in each axis; root mean square about 1 in each.
-std::function<Vector3d(double)> random_waves(Random& random, double low_hz, double high_hz) {
-  struct Wave {
-    Vector3d amplitude, omega, phase;
-  };
-  std::array<Wave, 5> waves;
-  for (Wave& w : waves)
-    for (int axis = 0; axis < 3; ++axis) {
-      const double hz = low_hz * std::pow(high_hz / low_hz, random.uniform());
-      w.omega[axis] = 2 * kPi * hz;
-      w.amplitude[axis] = std::sqrt(2.0 / waves.size());
-      w.phase[axis] = random.uniform(0, 2 * kPi);
-    }
-  return [waves](double t) {
-    Vector3d sum = Vector3d::Zero();
-    for (const Wave& w : waves)
-      for (int axis = 0; axis < 3; ++axis)
-        sum[axis] += w.amplitude[axis] * std::sin(w.omega[axis] * t + w.phase[axis]);
-    return sum;
-  };
-}
-
-std::function<Vector3d(double)> lissajous(const Vector3d& half, const Vector3d& ratio, Random& random) {
-  const Vector3d phase(random.uniform(0, 2 * kPi), random.uniform(0, 2 * kPi), random.uniform(0, 2 * kPi));
-  return [=](double a) -> Vector3d { return half.cwiseProduct(Vector3d((ratio * a + phase).array().sin())); };
-}
-
-/// Turns of a rounded square across the heading that grow from a quarter of the volume to all of it and back.
-std::function<Vector3d(double)> square_spiral(const Vector3d& half, Random& random) {
-  constexpr double kTurns = 4;  // out
-  constexpr double kSmallest = 0.25;
-  constexpr double kSquare = 0.1;  // share of the third harmonic that makes a circle a rounded square
-  constexpr double kDepth = 0.3;   // of the volume, to and fro along the heading
-  const double side = std::min(half.y(), half.z()) / (1 - kSquare);
-  const double start = random.uniform(0, 2 * kPi), depth_phase = random.uniform(0, 2 * kPi);
-  return [=](double a) -> Vector3d {
-    const double open = 0.5 - 0.5 * std::cos(a / (2 * kTurns));
-    const double radius = side * (kSmallest + (1 - kSmallest) * open);
-    const double angle = a + start;
-    return {kDepth * half.x() * std::sin(0.31 * a + depth_phase),
-            radius * (std::cos(angle) - kSquare * std::cos(3 * angle)),
-            radius * (std::sin(angle) + kSquare * std::sin(3 * angle))};
-  };
-}
-
 Error too_long(double duration_s) {
   return {"trajectory.speed_m_s", text("the way takes ", duration_s, " s"),
           text("fly faster, or give a duration up to ", kLongest_s, " s")};
-}
-
-/// Least jerk from 0 to 1.
-double ease(double u) {
-  u = std::clamp(u, 0.0, 1.0);
-  return u * u * u * (10 + u * (6 * u - 15));
 }
 
 Plan plan_landing(const TrajectoryConfig& c, const Values& v, Random& random) {
@@ -337,26 +241,6 @@ double flight_time(double t_s, double rest_s) {
   if (rest_s <= 0) return t_s;
   const double u = std::max(0.0, t_s - rest_s) / kStart_s;
   return kStart_s * (u < 1 ? u * u * u * (1 - 0.5 * u) : u - 0.5);
-}
-
-/// Mean over +-half_width knots, twice: rounds corners. The ends are held.
-template <class T>
-std::vector<T> smooth(std::vector<T> values, std::ptrdiff_t half_width) {
-  const auto count = static_cast<std::ptrdiff_t>(values.size());
-  for (int pass = 0; pass < 2; ++pass) {
-    const auto at = [&](std::ptrdiff_t k) -> const T& {
-      return values[static_cast<std::size_t>(std::clamp(k, std::ptrdiff_t{0}, count - 1))];
-    };
-    std::vector<T> out(values.size(), values[0]);
-    // Sums are made anew for each value: a running one would remember its rounding.
-    for (std::ptrdiff_t k = 0; k < count; ++k) {
-      T sum = at(k - half_width);
-      for (std::ptrdiff_t j = k - half_width + 1; j <= k + half_width; ++j) sum += at(j);
-      out[static_cast<std::size_t>(k)] = sum / static_cast<double>(2 * half_width + 1);
-    }
-    values = std::move(out);
-  }
-  return values;
 }
 
 /// Slow turning to and fro about z, y and x, whose fastest moment has about the rate.

@@ -229,7 +229,7 @@ void EventPixels::set_bounds(Pixel& p, TimeNs t) const {
 }
 
 void EventPixels::fire(std::size_t pixel, TimeNs t, bool on, EventCause cause,
-                       std::vector<SimEvent>& events) {
+                       std::vector<SimEvent>& events) const {
   SimEvent event;
   event.t = t;
   const auto width = static_cast<std::size_t>(size_.width);

@@ -122,7 +122,7 @@ class EventPixels {
   void advance_limited(std::size_t pixel, const Span& span, std::vector<SimEvent>& events);
   template <class Signal>
   void walk(std::size_t pixel, TimeNs t0, TimeNs t1, const Signal& signal, std::vector<SimEvent>& events);
-  void fire(std::size_t pixel, TimeNs t, bool on, EventCause cause, std::vector<SimEvent>& events);
+  void fire(std::size_t pixel, TimeNs t, bool on, EventCause cause, std::vector<SimEvent>& events) const;
   void set_reference(Pixel& p, double log_luminance, TimeNs t) const;
   void set_bounds(Pixel& p, TimeNs t) const;
   double hot_rate_hz(std::size_t pixel) const;

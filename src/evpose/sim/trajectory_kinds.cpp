@@ -178,7 +178,7 @@ Expected<Plan> plan_waypoints(const TrajectoryConfig& c, const Values& v) {
     if (next == stops.end()) return part(stops.back());
     const Stop& a = *(next - 1);
     const double u = (time_s - a.t_s) / (next->t_s - a.t_s);
-    const decltype(part(a)) mixed = (1 - u) * part(a) + u * part(*next);
+    decltype(part(a)) mixed = (1 - u) * part(a) + u * part(*next);
     return mixed;
   };
   Plan plan;

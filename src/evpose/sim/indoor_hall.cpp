@@ -152,6 +152,7 @@ void add_lights(WorldDraft& d, const Hall& h) {
   Light daylight;
   daylight.name = "window";
   daylight.kind = LightKind::lamp;
+  daylight.daylight = true;
   daylight.position =
       V(kLength + 0.6, 0.5 * (kWindow.u0 + kWindow.u1), 0.5 * (kWindow.v0 + kWindow.v1) + 0.2);
   daylight.radius = 0.5;
@@ -160,6 +161,7 @@ void add_lights(WorldDraft& d, const Hall& h) {
   scene.lights.push_back(daylight);
   Light indirect;
   indirect.name = "daylight";
+  indirect.daylight = true;
   indirect.strength = 0.02 * window;
   scene.lights.push_back(indirect);
 }

@@ -21,9 +21,14 @@ std::int32_t MaterialShelf::add_plain(const std::string& name, double reflectanc
 
 std::int32_t MaterialShelf::add_glowing(const std::string& name, double cd_m2, int light) {
   const std::int32_t material = add_plain(name, 0.5);
-  materials_.back().emission_cd_m2 = cd_m2;
-  materials_.back().emission_light = light;
+  make_glow(material, cd_m2, light);
   return material;
+}
+
+void MaterialShelf::make_glow(std::int32_t material, double cd_m2, int light) {
+  Material& own = materials_[static_cast<std::size_t>(material)];
+  own.emission_cd_m2 = cd_m2;
+  own.emission_light = light;
 }
 
 std::int32_t MaterialShelf::add_textured(const std::string& name, double tone, const Repeat& repeat,

@@ -23,6 +23,8 @@ class MaterialShelf {
   /// Patterns are around 0.5: `tone` 1 gives a mean reflectance of 0.5.
   std::int32_t add_textured(const std::string& name, double tone, const Repeat& repeat, double texel_m,
                             Pattern pattern);
+  /// Light of its own besides; `light` as in Material::emission_light.
+  void make_glow(std::int32_t material, double cd_m2, int light);
   /// The same texture in another tone.
   std::int32_t add_toned(const std::string& name, double tone, std::int32_t of);
 

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 namespace evpose::sim {
 
@@ -53,5 +55,9 @@ Pattern container_side(const Repeat& repeat, std::uint64_t seed);
 
 /// The pattern with its contrasts (of the logarithm, about 0.5) times `factor`, kept within [0.02, 0.95].
 Pattern with_contrast(Pattern pattern, double factor);
+
+/// A pattern by the name of its function, with usual measures; none for an unknown name.
+Pattern named_pattern(const std::string& name, const Repeat& repeat, std::uint64_t seed);
+std::vector<std::string> pattern_names();
 
 }  // namespace evpose::sim

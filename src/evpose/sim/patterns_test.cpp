@@ -14,32 +14,13 @@ const Repeat kRepeat{3, 2.4};
 
 struct Named {
   std::string name;
-  Pattern (*make)(std::uint64_t seed);
+  Pattern make(std::uint64_t seed) const { return named_pattern(name, kRepeat, seed); }
 };
 
 std::vector<Named> all_patterns() {
-  return {{"bricks", [](std::uint64_t s) { return bricks(kRepeat, s); }},
-          {"tiles", [](std::uint64_t s) { return tiles(kRepeat, 0.3, s); }},
-          {"planks", [](std::uint64_t s) { return planks(kRepeat, 0.12, s); }},
-          {"plaster", [](std::uint64_t s) { return plaster(kRepeat, s); }},
-          {"wallpaper", [](std::uint64_t s) { return wallpaper(kRepeat, s); }},
-          {"ceiling_panels", [](std::uint64_t s) { return ceiling_panels(kRepeat, s); }},
-          {"marble", [](std::uint64_t s) { return marble(kRepeat, s); }},
-          {"carpet", [](std::uint64_t s) { return carpet(kRepeat, s); }},
-          {"cloth", [](std::uint64_t s) { return cloth(kRepeat, s); }},
-          {"paving", [](std::uint64_t s) { return paving(kRepeat, s); }},
-          {"asphalt", [](std::uint64_t s) { return asphalt(kRepeat, s); }},
-          {"gravel", [](std::uint64_t s) { return gravel(kRepeat, s); }},
-          {"grass", [](std::uint64_t s) { return grass(kRepeat, s); }},
-          {"concrete", [](std::uint64_t s) { return concrete(kRepeat, s); }},
-          {"stucco", [](std::uint64_t s) { return stucco(kRepeat, s); }},
-          {"graffiti", [](std::uint64_t s) { return graffiti(kRepeat, s); }},
-          {"poster", [](std::uint64_t s) { return poster(kRepeat, s); }},
-          {"carton", [](std::uint64_t s) { return carton(kRepeat, s); }},
-          {"book_spines", [](std::uint64_t s) { return book_spines(kRepeat, 0.3, s); }},
-          {"screen_text", [](std::uint64_t s) { return screen_text(kRepeat, s); }},
-          {"container_side", [](std::uint64_t s) { return container_side(kRepeat, s); }},
-          {"window_panes", [](std::uint64_t s) { return window_panes(kRepeat, 0.6, s); }}};
+  std::vector<Named> all;
+  for (const std::string& name : pattern_names()) all.push_back({name});
+  return all;
 }
 
 double share_of_differences(const Pattern& a, const Pattern& b, double shift_u, double shift_v) {

@@ -50,11 +50,13 @@ void add_daylight(WorldDraft& draft) {
   Light sky;
   sky.name = "sky";
   sky.kind = LightKind::ambient;
+  sky.daylight = true;
   sky.strength = c.night ? kNightSkyLux : c.sky_lux;
   if (!c.night) {
     Light sun;
     sun.name = "sun";
     sun.kind = LightKind::sun;
+    sun.daylight = true;
     sun.strength = c.sun_lux;
     sun.radius = 4.65e-3;
     sun.direction = -Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),

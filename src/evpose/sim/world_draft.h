@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <string>
 
+#include "evpose/core/error.h"
 #include "evpose/sim/material_shelf.h"
 #include "evpose/sim/mesh_builder.h"
 #include "evpose/sim/random.h"
@@ -18,8 +19,7 @@ struct WorldDraft {
   MaterialShelf materials;
   Random random;
 
-  explicit WorldDraft(const WorldConfig& c)
-      : config(c), random(static_cast<std::uint64_t>(c.seed), 0x576F726C64) {}
+  explicit WorldDraft(const WorldConfig& c) : config(c) {}
 
   std::int32_t add_object(const std::string& name);
   /// A number for a pattern.
@@ -57,6 +57,8 @@ struct Post {
 void put_post(WorldDraft& draft, const Eigen::Vector3d& foot, const Post& post, const Finish& finish,
               bool lids = true);
 
+/// By the config's kind. Errors: moving things that the world has no room for.
+Status lay_out_world(WorldDraft& draft);
 void lay_out_hall(WorldDraft& draft);
 void lay_out_courtyard(WorldDraft& draft);
 void lay_out_canyon(WorldDraft& draft);

@@ -27,12 +27,12 @@ void describe(ConfigTable& table, WorldConfig& c) {
   table.group("movers", c.movers);
 }
 
-Expected<Scene> make_world(const WorldConfig& config, ThreadPool& pool) {
-  if (config.kind == WorldKind::hall && config.movers.cars > 0)
+Status lay_out_world(WorldDraft& draft) {
+  if (draft.config.kind == WorldKind::hall && draft.config.movers.cars > 0)
     return Error{"movers.cars", "the hall has no room for cars",
                  "take the courtyard or the canyon, or 0 cars"};
-  WorldDraft draft(config);
-  switch (config.kind) {
+  draft.random = Random(static_cast<std::uint64_t>(draft.config.seed), 0x576F726C64);
+  switch (draft.config.kind) {
     case WorldKind::hall:
       lay_out_hall(draft);
       break;
@@ -43,6 +43,12 @@ Expected<Scene> make_world(const WorldConfig& config, ThreadPool& pool) {
       lay_out_canyon(draft);
       break;
   }
+  return {};
+}
+
+Expected<Scene> make_world(const WorldConfig& config, ThreadPool& pool) {
+  WorldDraft draft(config);
+  if (auto status = lay_out_world(draft); !status) return status.error();
   draft.scene.materials = draft.materials.take(config.texture_contrast, pool);
   return std::move(draft.scene);
 }

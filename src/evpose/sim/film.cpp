@@ -27,7 +27,6 @@ constexpr double kMargin = 1.2;  // motion may get faster within a block
 // Which surface of what stands still the pixels' centres see.
 struct SurfaceImage {
   std::vector<std::int32_t> group, patch;
-  std::vector<float> depth;  // m; sky: infinite
 };
 
 struct Extent {
@@ -129,20 +128,24 @@ void Film::Impl::look(const Pose& T_map_cam, SurfaceImage& image) {
   const std::size_t n = rays.size();
   image.group.resize(n);
   image.patch.resize(n);
-  image.depth.resize(n);
   const Eigen::Matrix3d R = T_map_cam.rotation();
   pool.for_chunks(work.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const Tile& tile = work[k].tile;
       float nearest = std::numeric_limits<float>::infinity();
+      std::array<Eigen::Vector3f, kTilePx> ways;
+      std::array<RayCaster::BatchHit, kTilePx> hits;
       for (int y = tile.y0; y < tile.y0 + tile.height; ++y) {
-        for (int x = tile.x0; x < tile.x0 + tile.width; ++x) {
-          const std::size_t i = index(x, y);
-          const auto hit = stage.rays.trace(T_map_cam.p, R * rays[i].direction().cast<double>());
-          image.patch[i] = hit ? stage.still.patch_of[hit->triangle] : -1;
-          image.group[i] = hit ? stage.still.patches[image.patch[i]].group : kSky;
-          image.depth[i] = hit ? hit->distance : std::numeric_limits<float>::infinity();
-          nearest = std::min(nearest, image.depth[i]);
+        const std::size_t first = index(tile.x0, y);
+        for (int x = 0; x < tile.width; ++x)
+          ways[x] = (R * rays[first + x].direction().cast<double>()).cast<float>();
+        stage.rays.trace_batch(T_map_cam.p, {ways.data(), static_cast<std::size_t>(tile.width)}, hits);
+        for (int x = 0; x < tile.width; ++x) {
+          const std::size_t i = first + x;
+          const bool met = hits[x].triangle != RayCaster::kNoTriangle;
+          image.patch[i] = met ? stage.still.patch_of[hits[x].triangle] : -1;
+          image.group[i] = met ? stage.still.patches[image.patch[i]].group : kSky;
+          nearest = std::min(nearest, hits[x].distance);
         }
       }
       work[k].nearest = std::max(nearest, static_cast<float>(kNearest_m));

@@ -3,6 +3,8 @@
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <vector>
 
@@ -108,6 +110,38 @@ std::optional<RayHit> RayCaster::trace_at(double t_s, const Eigen::Vector3d& ori
     if (closer) hit = closer;
   }
   return hit;
+}
+
+void RayCaster::trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
+                            std::span<BatchHit> hits) const {
+  constexpr std::size_t kWide = 8;
+  const Eigen::Vector3f from = origin.cast<float>();
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  for (std::size_t first = 0; first < directions.size(); first += kWide) {
+    const std::size_t n = std::min(kWide, directions.size() - first);
+    RTCRayHit8 query{};
+    alignas(32) std::array<int, kWide> valid{};
+    for (std::size_t i = 0; i < n; ++i) {
+      valid[i] = -1;
+      query.ray.org_x[i] = from.x();
+      query.ray.org_y[i] = from.y();
+      query.ray.org_z[i] = from.z();
+      query.ray.dir_x[i] = directions[first + i].x();
+      query.ray.dir_y[i] = directions[first + i].y();
+      query.ray.dir_z[i] = directions[first + i].z();
+      query.ray.tfar[i] = std::numeric_limits<float>::infinity();
+      query.ray.mask[i] = ~0u;
+      query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    rtcIntersect8(valid.data(), impl_->still.get(), &context, &query);
+    for (std::size_t i = 0; i < n; ++i) {
+      const bool met = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      hits[first + i] = {query.ray.tfar[i], met ? query.hit.primID[i] : kNoTriangle};
+    }
+  }
 }
 
 bool RayCaster::blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near,

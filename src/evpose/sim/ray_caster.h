@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "evpose/core/pose.h"
 #include "evpose/sim/scene.h"
@@ -29,6 +30,15 @@ class RayCaster {
   /// First surface in (near, far), lengths of `direction`, of what stands still. Map frame.
   std::optional<RayHit> trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near = 0,
                               float far = std::numeric_limits<float>::infinity()) const;
+  /// Rays from one place, of which neighbours go much the same way: what trace() says of each, faster.
+  /// `triangle` is kNoTriangle where nothing is met.
+  static constexpr std::uint32_t kNoTriangle = 0xFFFFFFFF;
+  struct BatchHit {
+    float distance;
+    std::uint32_t triangle;
+  };
+  void trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
+                   std::span<BatchHit> hits) const;
   /// Moving parts too, as they stand at `t_s`.
   std::optional<RayHit> trace_at(double t_s, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                  float near = 0, float far = std::numeric_limits<float>::infinity()) const;

@@ -31,38 +31,147 @@ Border border_of(const Stage& stage, const View& view, const PixelSample& sample
   return {T_part_cam.q.conjugate() * p.cross(q)};
 }
 
-TileSampler::Hit TileSampler::trace(const PixelRay& ray, float x, float y) const {
-  const Eigen::Vector3d in_camera = ray.direction(x, y).cast<double>();
-  auto found = stage_.rays.trace(view_->T_map_cam.p, view_->R_map_cam * in_camera);
-  for (const int part : movers_) {
-    const Pose& T_part_cam = view_->T_part_cam[part];
-    const auto closer =
-        stage_.rays.trace_part(part, T_part_cam.p, T_part_cam.q * in_camera, 0,
-                               found ? found->distance : std::numeric_limits<float>::infinity());
-    if (closer) found = closer;
-  }
+TileSampler::Hit TileSampler::hit_of(std::uint32_t triangle, float depth, int part) const {
   Hit hit;
-  hit.at = {x, y};
-  if (!found) return hit;
-  const PartSurfaces& surfaces = stage_.surfaces_of(found->part);
-  hit.patch = surfaces.patch_of[found->triangle];
+  const PartSurfaces& surfaces = stage_.surfaces_of(part);
+  hit.patch = surfaces.patch_of[triangle];
   hit.group = surfaces.patches[hit.patch].group;
-  hit.part = found->part;
-  hit.triangle = found->triangle;
-  hit.depth = found->distance;
+  hit.part = part;
+  hit.triangle = triangle;
+  hit.depth = depth;
   return hit;
 }
 
-const TileSampler::Hit& TileSampler::corner(int x, int y) {
-  const std::size_t i = static_cast<std::size_t>(y) * kCorners + x;
-  if (!traced_[i]) {
-    // Of the pixel to the lower right, or the last there is.
-    const int px = std::min(x, plan_->tile.width - 1), py = std::min(y, plan_->tile.height - 1);
-    corners_[i] = trace(ray(plan_->tile.x0 + px, plan_->tile.y0 + py), static_cast<float>(x - px) - 0.5F,
-                        static_cast<float>(y - py) - 0.5F);
-    traced_[i] = true;
+// Moving parts that may touch the pixel.
+void TileSampler::find_movers(int x, int y) {
+  movers_.clear();
+  const int column = plan_->tile.x0 + x, row = plan_->tile.y0 + y;
+  for (const TilePlan::Mover& m : plan_->movers) {
+    if (column >= m.x0 && column < m.x1 && row >= m.y0 && row < m.y1) movers_.push_back(m.part);
   }
-  return corners_[i];
+}
+
+void TileSampler::add_movers(const PixelRay& ray, float x, float y, Hit& hit) const {
+  const Eigen::Vector3d in_camera = ray.direction(x, y).cast<double>();
+  for (const int part : movers_) {
+    const Pose& T_part_cam = view_->T_part_cam[part];
+    const float far = hit.group == kSky ? std::numeric_limits<float>::infinity() : hit.depth;
+    const auto closer = stage_.rays.trace_part(part, T_part_cam.p, T_part_cam.q * in_camera, 0, far);
+    if (closer) hit = hit_of(closer->triangle, closer->distance, part);
+  }
+}
+
+TileSampler::Hit TileSampler::trace(const PixelRay& ray, float x, float y) const {
+  const auto found =
+      stage_.rays.trace(view_->T_map_cam.p, view_->R_map_cam * ray.direction(x, y).cast<double>());
+  Hit hit = found ? hit_of(found->triangle, found->distance, -1) : Hit{};
+  add_movers(ray, x, y, hit);
+  hit.at = {x, y};
+  return hit;
+}
+
+// Rays of one sample of a tile, together.
+struct TileSampler::Batch {
+  static constexpr std::size_t kMost = static_cast<std::size_t>(kCorners) * kCorners;
+  std::size_t n = 0;
+  std::array<Eigen::Vector3f, kMost> ways;
+  std::array<std::uint16_t, kMost> places;
+  std::array<RayCaster::BatchHit, kMost> hits;
+
+  void add(std::size_t place, const Eigen::Matrix3d& R_map_cam, const Eigen::Vector3f& in_camera) {
+    ways[n] = (R_map_cam * in_camera.cast<double>()).cast<float>();
+    places[n++] = static_cast<std::uint16_t>(place);
+  }
+};
+
+void TileSampler::trace_centres() {
+  Batch batch;
+  const Tile& tile = plan_->tile;
+  for (int y = 0; y < tile.height; ++y) {
+    for (int x = 0; x < tile.width; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
+      if (plan_->pixel[i] != PixelClass::flat) {
+        batch.add(i, view_->R_map_cam, ray(tile.x0 + x, tile.y0 + y).direction());
+      } else {
+        centres_[i] = {};
+        if (plan_->patch[i] >= 0) centres_[i].group = stage_.still.patches[plan_->patch[i]].group;
+      }
+    }
+  }
+  stage_.rays.trace_batch(view_->T_map_cam.p, {batch.ways.data(), batch.n}, batch.hits);
+  for (std::size_t k = 0; k < batch.n; ++k) {
+    const std::size_t i = batch.places[k];
+    const RayCaster::BatchHit& found = batch.hits[k];
+    Hit& hit = centres_[i];
+    hit = found.triangle == RayCaster::kNoTriangle ? Hit{} : hit_of(found.triangle, found.distance, -1);
+    const int x = static_cast<int>(i % kTilePx), y = static_cast<int>(i / kTilePx);
+    find_movers(x, y);
+    if (!movers_.empty()) add_movers(ray(tile.x0 + x, tile.y0 + y), 0, 0, hit);
+  }
+}
+
+// True if another group is next to the pixel, or may be: neighbours in other tiles are not known.
+bool TileSampler::near_border(int x, int y) const {
+  const Tile& tile = plan_->tile;
+  if (x == 0 || y == 0 || x + 1 == tile.width || y + 1 == tile.height) return true;
+  const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
+  for (const std::size_t j : {i - kTilePx - 1, i - kTilePx, i - kTilePx + 1, i - 1, i + 1, i + kTilePx - 1,
+                              i + kTilePx, i + kTilePx + 1}) {
+    if (centres_[j].group != centres_[i].group) return true;
+  }
+  return false;
+}
+
+void TileSampler::trace_corners() {
+  Batch batch;
+  std::array<bool, Batch::kMost> wanted{};
+  const Tile& tile = plan_->tile;
+  for (int y = 0; y < tile.height; ++y) {
+    for (int x = 0; x < tile.width; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
+      at_border_[i] = plan_->pixel[i] == PixelClass::open && near_border(x, y);
+      if (!at_border_[i]) continue;
+      const std::size_t c = static_cast<std::size_t>(y) * kCorners + x;
+      wanted[c] = wanted[c + 1] = wanted[c + kCorners] = wanted[c + kCorners + 1] = true;
+    }
+  }
+  // A corner is the upper left one of its pixel; at the tile's end, a right or lower one of the last.
+  const auto pixel_of = [&](std::size_t c) {
+    return std::array<int, 2>{std::min(static_cast<int>(c % kCorners), tile.width - 1),
+                              std::min(static_cast<int>(c / kCorners), tile.height - 1)};
+  };
+  const auto offset_of = [&](std::size_t c, const std::array<int, 2>& pixel) {
+    return Eigen::Vector2f(static_cast<float>(static_cast<int>(c % kCorners) - pixel[0]) - 0.5F,
+                           static_cast<float>(static_cast<int>(c / kCorners) - pixel[1]) - 0.5F);
+  };
+  for (std::size_t c = 0; c < wanted.size(); ++c) {
+    if (!wanted[c]) continue;
+    const auto pixel = pixel_of(c);
+    const Eigen::Vector2f at = offset_of(c, pixel);
+    batch.add(c, view_->R_map_cam, ray(tile.x0 + pixel[0], tile.y0 + pixel[1]).direction(at.x(), at.y()));
+  }
+  stage_.rays.trace_batch(view_->T_map_cam.p, {batch.ways.data(), batch.n}, batch.hits);
+  for (std::size_t k = 0; k < batch.n; ++k) {
+    const std::size_t c = batch.places[k];
+    const RayCaster::BatchHit& found = batch.hits[k];
+    Hit& hit = corners_[c];
+    hit = found.triangle == RayCaster::kNoTriangle ? Hit{} : hit_of(found.triangle, found.distance, -1);
+    const auto pixel = pixel_of(c);
+    find_movers(pixel[0], pixel[1]);
+    if (movers_.empty()) continue;
+    const Eigen::Vector2f at = offset_of(c, pixel);
+    add_movers(ray(tile.x0 + pixel[0], tile.y0 + pixel[1]), at.x(), at.y(), hit);
+  }
+}
+
+// The pixel's centre and its corners, row by row.
+std::array<TileSampler::Hit, 5> TileSampler::around(int x, int y) const {
+  const std::size_t c = static_cast<std::size_t>(y) * kCorners + x;
+  std::array<Hit, 5> hits{centres_[static_cast<std::size_t>(y) * kTilePx + x], corners_[c], corners_[c + 1],
+                          corners_[c + kCorners], corners_[c + kCorners + 1]};
+  constexpr std::array<float, 5> kX = {0, -0.5F, 0.5F, -0.5F, 0.5F}, kY = {0, -0.5F, -0.5F, 0.5F, 0.5F};
+  for (int i = 0; i < 5; ++i) hits[i].at = {kX[i], kY[i]};
+  return hits;
 }
 
 const PatchView& TileSampler::patch_view(int part, std::int32_t patch) {
@@ -190,18 +299,22 @@ bool TileSampler::parted(const Hit& a, const Hit& b, const PixelRay& ray) const 
 }
 
 void TileSampler::sample_open(int x, int y, PixelSample& out) {
-  const PixelRay& r = ray(plan_->tile.x0 + x, plan_->tile.y0 + y);
-  movers_.clear();
-  for (const TilePlan::Mover& m : plan_->movers) {
-    const int column = plan_->tile.x0 + x, row = plan_->tile.y0 + y;
-    if (column >= m.x0 && column < m.x1 && row >= m.y0 && row < m.y1) movers_.push_back(m.part);
+  const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
+  if (at_border_[i]) {
+    sample_border(x, y, out);
+    return;
   }
-  std::array<Hit, 5> hits{trace(r, 0, 0), corner(x, y), corner(x + 1, y), corner(x, y + 1),
-                          corner(x + 1, y + 1)};
-  constexpr std::array<float, 5> kX = {0, -0.5F, 0.5F, -0.5F, 0.5F}, kY = {0, -0.5F, -0.5F, 0.5F, 0.5F};
+  describe_hit(centres_[i], out);
+  out.moving = centres_[i].part >= 0;
+  out.luminance = shade(centres_[i], ray(plan_->tile.x0 + x, plan_->tile.y0 + y), 0, 0);
+}
+
+void TileSampler::sample_border(int x, int y, PixelSample& out) {
+  const PixelRay& r = ray(plan_->tile.x0 + x, plan_->tile.y0 + y);
+  find_movers(x, y);
+  const std::array<Hit, 5> hits = around(x, y);
   std::int32_t other = kNone;
   for (int i = 0; i < 5; ++i) {
-    hits[i].at = {kX[i], kY[i]};
     out.moving = out.moving || hits[i].part >= 0;
     if (hits[i].group == hits[0].group || hits[i].group == other) continue;
     other = other == kNone ? hits[i].group : kMany;
@@ -244,32 +357,27 @@ void TileSampler::sample(const View& view, const TilePlan& plan, TileSamples& ou
   plan_ = &plan;
   patch_views_.clear();
   last_view_ = 0;
-  traced_.fill(false);
+  const bool rays_needed =
+      std::any_of(plan.pixel.begin(), plan.pixel.end(), [](PixelClass c) { return c != PixelClass::flat; });
+  if (rays_needed) {
+    trace_centres();
+    trace_corners();
+  }
   for (int y = 0; y < plan.tile.height; ++y) {
     for (int x = 0; x < plan.tile.width; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
       PixelSample& sample = out[i];
       sample = {};
-      if (plan.pixel[i] == PixelClass::open) {
-        sample_open(x, y, sample);
-        continue;
-      }
-      const PixelRay& r = ray(plan.tile.x0 + x, plan.tile.y0 + y);
-      if (plan.pixel[i] == PixelClass::smooth) {
-        movers_.clear();
-        const Hit hit = trace(r, 0, 0);
-        describe_hit(hit, sample);
-        sample.luminance = shade(hit, r, 0, 0);
-        continue;
-      }
-      if (plan.patch[i] < 0) {
+      if (plan.pixel[i] != PixelClass::flat) {
+        sample_open(x, y, sample);  // a smooth pixel is an open one without a border
+      } else if (plan.patch[i] < 0) {
         sample.luminance = static_cast<float>(stage_.scene.sky_cd_m2);
-        continue;
+      } else {
+        const PatchView& patch = patch_view(-1, plan.patch[i]);
+        sample.group = patch.patch->group;
+        sample.object = static_cast<std::uint16_t>(patch.patch->object);
+        sample.luminance = luminance(stage_, view, patch, ray(plan.tile.x0 + x, plan.tile.y0 + y));
       }
-      const PatchView& patch = patch_view(-1, plan.patch[i]);
-      sample.group = patch.patch->group;
-      sample.object = static_cast<std::uint16_t>(patch.patch->object);
-      sample.luminance = luminance(stage_, view, patch, r);
     }
   }
 }

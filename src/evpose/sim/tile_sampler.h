@@ -95,15 +95,22 @@ class TileSampler {
     int part = -1;
     std::uint32_t triangle = 0;
     float depth = 0;
-    Eigen::Vector2f at;  ///< in pixels from the pixel's centre
+    Eigen::Vector2f at = Eigen::Vector2f::Zero();  ///< in pixels from the pixel's centre
   };
-  struct Found;
+  struct Batch;
 
   Hit trace(const PixelRay& ray, float x, float y) const;
-  const Hit& corner(int x, int y);
+  Hit hit_of(std::uint32_t triangle, float depth, int part) const;
+  void add_movers(const PixelRay& ray, float x, float y, Hit& hit) const;
+  void find_movers(int x, int y);
+  void trace_centres();
+  void trace_corners();
+  bool near_border(int x, int y) const;
+  std::array<Hit, 5> around(int x, int y) const;
   float shade(const Hit& hit, const PixelRay& ray, float x, float y);
   const PatchView& patch_view(int part, std::int32_t patch);
   void sample_open(int x, int y, PixelSample& out);
+  void sample_border(int x, int y, PixelSample& out);
   bool split(const PixelRay& ray, const std::array<Hit, 5>& hits, PixelSample& out);
   bool separates(const Border& border, const PixelRay& ray, const std::array<Hit, 5>& hits,
                  PixelSample& out) const;
@@ -120,8 +127,9 @@ class TileSampler {
   std::vector<PatchView> patch_views_;
   std::size_t last_view_ = 0;
   static constexpr int kCorners = kTilePx + 1;
+  std::array<Hit, kTilePx * kTilePx> centres_;
+  std::array<bool, kTilePx * kTilePx> at_border_{};  ///< open pixels that more than their centre is asked of
   std::array<Hit, kCorners * kCorners> corners_;
-  std::array<bool, kCorners * kCorners> traced_{};
 };
 
 }  // namespace evpose::sim

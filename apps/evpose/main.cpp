@@ -23,6 +23,7 @@ int run_program(int argc, char** argv) {
   app.add_flag("-q,--quiet", quiet, "warnings and progress off");
 
   std::function<int()> run;
+  add_demo(app, run);
   add_simulate(app, run);
   add_track(app, run);
   add_eval(app, run);

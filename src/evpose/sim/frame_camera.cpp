@@ -8,8 +8,8 @@
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
 #include "evpose/io/atomic_file.h"
+#include "evpose/io/new_folder.h"
 #include "evpose/io/png_file.h"
-#include "evpose/io/temporary_folder.h"
 
 namespace evpose::sim {
 namespace {
@@ -28,8 +28,8 @@ std::uint8_t grey_value(double luminance, double white, double range_db) {
   return static_cast<std::uint8_t>(std::lround(255 * std::pow(std::min(luminance / white, 1.0), kGamma)));
 }
 
-Expected<FrameCamera> FrameCamera::create(const TemporaryFolder& folder, ImageSize size,
-                                          const FramesConfig& config, TimeNs end) {
+Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, ImageSize size, const FramesConfig& config,
+                                          TimeNs end) {
   if (config.rate_hz > 0) {
     if (config.exposure_ms * 1e-3 * config.rate_hz > 1)
       return Error{"frames.exposure_ms",
@@ -87,7 +87,7 @@ Status FrameCamera::finish() {
                          "#timestamp_ns,filename,exposure_ns\n" + stamps_);
 }
 
-Status write_depth(const TemporaryFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
+Status write_depth(const NewFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
                    ImageSize size, const std::function<Pose(double t_s)>& T_map_cam,
                    const DepthConfig& config, TimeNs end, ThreadPool& pool) {
   if (!(config.rate_hz > 0)) return {};

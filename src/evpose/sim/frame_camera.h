@@ -9,7 +9,7 @@
 #include "evpose/sim/film.h"
 
 namespace evpose {
-class TemporaryFolder;
+class NewFolder;
 }
 
 namespace evpose::sim {
@@ -30,7 +30,7 @@ std::uint8_t grey_value(double luminance, double white, double range_db);
 class FrameCamera {
  public:
   /// Keeps a reference to the folder.
-  static Expected<FrameCamera> create(const TemporaryFolder& folder, ImageSize size,
+  static Expected<FrameCamera> create(const NewFolder& folder, ImageSize size,
                                       const FramesConfig& config, TimeNs end);
 
   /// Exposures that are open at some time in [t0, t1].
@@ -41,10 +41,10 @@ class FrameCamera {
   int written() const { return written_; }
 
  private:
-  FrameCamera(const TemporaryFolder& folder, ImageSize size, const FramesConfig& config, TimeNs end)
+  FrameCamera(const NewFolder& folder, ImageSize size, const FramesConfig& config, TimeNs end)
       : folder_(&folder), size_(size), config_(config), white_(config.white_cd_m2), end_(end) {}
 
-  const TemporaryFolder* folder_;
+  const NewFolder* folder_;
   ImageSize size_;
   FramesConfig config_;
   double white_;
@@ -62,7 +62,7 @@ void describe(ConfigTable& table, DepthConfig& config);
 
 /// Writes depth/NNNNNN.png, 16 bits, millimetres, 0 beyond 65.5 m and where there is nothing, and
 /// depth/timestamps.csv.
-Status write_depth(const TemporaryFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
+Status write_depth(const NewFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
                    ImageSize size, const std::function<Pose(double t_s)>& T_map_cam,
                    const DepthConfig& config, TimeNs end, ThreadPool& pool);
 

@@ -13,10 +13,11 @@
 #include "evpose/io/events_h5.h"
 #include "evpose/io/imu_csv.h"
 #include "evpose/io/kalibr.h"
-#include "evpose/io/temporary_folder.h"
+#include "evpose/io/new_folder.h"
 #include "evpose/io/trajectory_tum.h"
 #include "evpose/sim/flight_check.h"
 #include "evpose/sim/scene_contours.h"
+#include "evpose/sim/scene_file.h"
 #include "evpose/sim/view.h"
 
 namespace evpose::sim {
@@ -39,7 +40,8 @@ void switch_lamps(const LampConfig& lamps, Scene& scene) {
 }
 
 Expected<Scene> make_scene(const Scenario& scenario, ThreadPool& pool) {
-  auto scene = make_world(scenario.world, pool);
+  auto scene = scenario.scene_file.empty() ? make_world(scenario.world, pool)
+                                           : read_scene(scenario.scene_file, scenario.world, pool);
   if (scene) switch_lamps(scenario.lamps, *scene);
   return scene;
 }
@@ -58,8 +60,7 @@ Film::Path camera_path(const Trajectory& trajectory, const Pose& T_body_cam) {
 // Writes events as they are delivered.
 class EventSink {
  public:
-  static Expected<EventSink> create(const TemporaryFolder& folder, ImageSize size, bool truth,
-                                    const Scene& scene) {
+  static Expected<EventSink> create(const NewFolder& folder, ImageSize size, bool truth, const Scene& scene) {
     EventSink sink;
     auto events = EventWriterH5::create(folder.path("events.h5"), size, "evpose simulate");
     if (!events) return events.error();
@@ -116,8 +117,7 @@ bool has_contrast(const RayCaster& rays, const Stage& stage, const std::vector<P
 
 class Maker {
  public:
-  Maker(const Scenario& scenario, const TemporaryFolder& folder, int threads,
-        std::function<void(double)> progress)
+  Maker(const Scenario& scenario, const NewFolder& folder, int threads, std::function<void(double)> progress)
       : scenario_(scenario), folder_(folder), pool_(threads), progress_(std::move(progress)) {}
 
   Expected<RecordingCounts> make();
@@ -132,7 +132,7 @@ class Maker {
   }
 
   const Scenario& scenario_;
-  const TemporaryFolder& folder_;
+  const NewFolder& folder_;
   ThreadPool pool_;
   std::function<void(double)> progress_;
   RecordingCounts counts_;
@@ -246,7 +246,7 @@ Expected<RecordingCounts> Maker::make() {
 
 Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::string& folder, int threads,
                                          const std::function<void(double)>& progress) {
-  auto temporary = TemporaryFolder::create(folder, kScenarioFile);
+  auto temporary = NewFolder::create(folder, kScenarioFile);
   if (!temporary) return temporary.error();
   auto counts = Maker(scenario, *temporary, threads, progress).make();
   if (!counts) return counts;

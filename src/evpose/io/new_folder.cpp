@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/io/temporary_folder.h"
+#include "evpose/io/new_folder.h"
 
 #include <unistd.h>
 
@@ -9,7 +9,7 @@ namespace evpose {
 
 namespace fs = std::filesystem;
 
-Expected<TemporaryFolder> TemporaryFolder::create(const std::string& target, const std::string& mark) {
+Expected<NewFolder> NewFolder::create(const std::string& target, const std::string& mark) {
   std::error_code failed;
   fs::path place = fs::path(target).lexically_normal();
   if (place.filename().empty()) place = place.parent_path();  // "name/"
@@ -23,16 +23,16 @@ Expected<TemporaryFolder> TemporaryFolder::create(const std::string& target, con
   if (!fs::create_directory(path, failed) || failed)
     return Error{target, text("cannot be made: ", failed ? failed.message() : "the name is taken"),
                  "choose a folder that can be written"};
-  return TemporaryFolder(place.string(), std::move(path));
+  return NewFolder(place.string(), std::move(path));
 }
 
-TemporaryFolder::TemporaryFolder(std::string target, std::string path)
+NewFolder::NewFolder(std::string target, std::string path)
     : target_(std::move(target)), path_(std::move(path)) {}
 
-TemporaryFolder::TemporaryFolder(TemporaryFolder&& other) noexcept
+NewFolder::NewFolder(NewFolder&& other) noexcept
     : target_(std::move(other.target_)), path_(std::exchange(other.path_, {})) {}
 
-TemporaryFolder& TemporaryFolder::operator=(TemporaryFolder&& other) noexcept {
+NewFolder& NewFolder::operator=(NewFolder&& other) noexcept {
   if (this != &other) {
     remove();
     target_ = std::move(other.target_);
@@ -41,22 +41,22 @@ TemporaryFolder& TemporaryFolder::operator=(TemporaryFolder&& other) noexcept {
   return *this;
 }
 
-TemporaryFolder::~TemporaryFolder() { remove(); }
+NewFolder::~NewFolder() { remove(); }
 
-void TemporaryFolder::remove() {
+void NewFolder::remove() {
   std::error_code ignored;
   if (!path_.empty()) fs::remove_all(path_, ignored);
   path_.clear();
 }
 
-Status TemporaryFolder::make_folder(const std::string& name) const {
+Status NewFolder::make_folder(const std::string& name) const {
   std::error_code failed;
   fs::create_directory(path(name), failed);
   if (failed) return Error{path(name), text("cannot be made: ", failed.message()), "check the disk"};
   return {};
 }
 
-Status TemporaryFolder::commit() {
+Status NewFolder::commit() {
   // The old one goes aside first: a folder that is not empty cannot be replaced in one step.
   const std::string old = path_ + ".old";
   std::error_code failed;

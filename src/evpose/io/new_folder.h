@@ -9,14 +9,14 @@ namespace evpose {
 
 /// A folder that appears under its name when all of it is written: until then it has a name of its own beside
 /// it. Unless committed, it is removed again.
-class TemporaryFolder {
+class NewFolder {
  public:
   /// `mark`: a file by which a folder that may be replaced is known. Errors: something without it stands at
   /// `target`; the place cannot be written. Missing parents are made.
-  static Expected<TemporaryFolder> create(const std::string& target, const std::string& mark);
-  TemporaryFolder(TemporaryFolder&& other) noexcept;
-  TemporaryFolder& operator=(TemporaryFolder&& other) noexcept;
-  ~TemporaryFolder();
+  static Expected<NewFolder> create(const std::string& target, const std::string& mark);
+  NewFolder(NewFolder&& other) noexcept;
+  NewFolder& operator=(NewFolder&& other) noexcept;
+  ~NewFolder();
 
   /// Of a file in the folder.
   std::string path(const std::string& name) const { return path_ + "/" + name; }
@@ -24,7 +24,7 @@ class TemporaryFolder {
   Status commit();
 
  private:
-  TemporaryFolder(std::string target, std::string path);
+  NewFolder(std::string target, std::string path);
   void remove();
 
   std::string target_, path_;  ///< path_ is empty once committed or moved from

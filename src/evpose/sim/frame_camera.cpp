@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
@@ -63,9 +62,11 @@ Status FrameCamera::develop(TimeNs t) {
     const Exposure& exposure = open_.front();
     const double length_s = to_seconds(exposure.close - exposure.open);
     if (!(white_ > 0)) {
-      constexpr double kWhiteOverMean = 4;
-      const double sum = std::accumulate(exposure.sum.begin(), exposure.sum.end(), 0.0);
-      white_ = kWhiteOverMean * sum / (length_s * static_cast<double>(exposure.sum.size()));
+      constexpr double kWhiteOverMedian = 6;
+      std::vector<float> sorted = exposure.sum;
+      const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+      std::nth_element(sorted.begin(), middle, sorted.end());
+      white_ = std::max(1e-6, kWhiteOverMedian * *middle / length_s);
     }
     std::vector<std::uint8_t> grey(exposure.sum.size());
     for (std::size_t i = 0; i < grey.size(); ++i)
@@ -118,7 +119,7 @@ void describe(ConfigTable& table, FramesConfig& c) {
   table.add("rate_hz", c.rate_hz, "Hz", "grey pictures; 0: none", {0, 1000});
   table.add("exposure_ms", c.exposure_ms, "ms", "mean of the luminance over so long", {0.01, 1000});
   table.add("white_cd_m2", c.white_cd_m2, "cd/m^2",
-            "shown as white; 0: four times the mean of the first picture", {0, 1e9});
+            "shown as white; 0: six times the median of the first picture", {0, 1e9});
   table.add("range_db", c.range_db, "dB", "what is darker than white by so much is black", {10, 140});
 }
 

@@ -18,7 +18,7 @@ namespace evpose::sim {
 struct FramesConfig {
   double rate_hz = 0;      ///< 0: none
   double exposure_ms = 8;  ///< mean of the luminance over so long
-  double white_cd_m2 = 0;  ///< shown as white; 0: four times the mean of the first picture
+  double white_cd_m2 = 0;  ///< shown as white; 0: six times the median of the first picture
   double range_db = 60;    ///< what is darker than white by so much is black
 };
 void describe(ConfigTable& table, FramesConfig& config);
@@ -30,8 +30,8 @@ std::uint8_t grey_value(double luminance, double white, double range_db);
 class FrameCamera {
  public:
   /// Keeps a reference to the folder.
-  static Expected<FrameCamera> create(const NewFolder& folder, ImageSize size,
-                                      const FramesConfig& config, TimeNs end);
+  static Expected<FrameCamera> create(const NewFolder& folder, ImageSize size, const FramesConfig& config,
+                                      TimeNs end);
 
   /// Exposures that are open at some time in [t0, t1].
   std::vector<Exposure*> exposures(TimeNs t0, TimeNs t1);

@@ -23,7 +23,7 @@ struct LampConfig {
   double off_factor = 0.02;            ///< what is left when they are off
   double fade_ms = 2;
   double flicker_hz = 0;  ///< of the light: twice the mains
-  double flicker_depth = 0.3;
+  double flicker_depth = 0.12;
 };
 void describe(ConfigTable& table, LampConfig& config);
 

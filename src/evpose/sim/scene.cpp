@@ -20,7 +20,7 @@ double LightSwitching::factor(double t_s) const {
 }
 
 double LightSwitching::step_s(double t_s) const {
-  constexpr double kStepsAWave = 40, kStepsAFade = 16;
+  constexpr double kStepsAWave = 16, kStepsAFade = 16;
   double step = flicker_depth > 0 ? 1 / (kStepsAWave * flicker_hz) : std::numeric_limits<double>::infinity();
   for (const double start : {off_at_s, on_at_s}) {
     if (start >= 0 && t_s >= start && t_s < start + fade_s) step = std::min(step, fade_s / kStepsAFade);

@@ -228,7 +228,8 @@ TEST(EventsH5, ErrorsSayWhatWhereAndWhatToDo) {
   EXPECT_TRUE(says(read_all(folder / "none.h5").error, {"none.h5", "no such file"}));
   EXPECT_TRUE(says(read_all(folder.file("empty.h5", "")).error, {"empty"}));
   EXPECT_TRUE(says(read_all(folder.file("text.h5", "1 2 3 0\n")).error, {"not an HDF5 file"}));
-  EXPECT_TRUE(says(read_all(folder.file("a.raw", "x"), {}, "raw").error, {"'raw'", "convert"}));
+  EXPECT_TRUE(says(read_all(folder.file("a.raw", "x"), {}, "raw").error, {"a.raw", "header of a RAW file"}));
+  EXPECT_TRUE(says(read_all(folder.file("a.raw", "x"), {}, "row").error, {"'row'", "one of h5, "}));
   EventReadOptions flip;
   flip.flip_x = true;
   EXPECT_TRUE(says(read_all(h5_file<std::int64_t>(folder, NumberType::i64, {1, 2, 3}, x, p), flip).error,

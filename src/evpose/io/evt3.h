@@ -7,19 +7,11 @@
 #include <vector>
 
 #include "evpose/camera/camera.h"
+#include "evpose/io/decode_faults.h"
 #include "evpose/io/event_block.h"
 #include "evpose/io/sensor_streams.h"
 
 namespace evpose {
-
-/// What a decoder met that a sound camera does not send.
-struct DecodeFaults {
-  std::int64_t time_regressions = 0;   ///< events held at the last stamp since time went back
-  std::int64_t discontinuities = 0;    ///< of these, steps back too large for a hiccup of the sensor
-  std::int64_t missing_time_high = 0;  ///< jumps over words that carry the time: lost data
-  std::int64_t outside = 0;            ///< events dropped since their pixel lies outside of the image
-  std::int64_t skipped_words = 0;      ///< of reserved kinds
-};
 
 /// EVT3, 16-bit words. State is kept from call to call, so that a stream may be fed in pieces of any length.
 /// Stamps never go back: what the camera stamps earlier than the event before gets that one's stamp, and is

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/event_formats.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "evpose/io/byte_stream.h"
+#include "evpose/io/events_dat.h"
+#include "evpose/io/events_h5.h"
+#include "evpose/io/events_raw.h"
+#include "evpose/io/events_text.h"
+
+namespace evpose {
+namespace {
+
+constexpr std::size_t kHeadBytes = 64 << 10;
+
+bool starts_as_hdf5(std::string_view head) { return head.starts_with("\x89HDF\r\n\x1A\n"); }
+
+Expected<std::vector<StreamInfo>> list_h5_streams(const std::string& path) {
+  const auto reader = open_events_h5(path, {});
+  if (!reader) return reader.error();
+  return std::vector<StreamInfo>{{StreamKind::events, "events", "HDF5", (*reader)->extent().count}};
+}
+
+Expected<std::vector<StreamInfo>> list_text_streams(const std::string& path) {
+  const auto reader = open_events_text(path, {});
+  if (!reader) return reader.error();
+  return std::vector<StreamInfo>{{StreamKind::events, "events", "text", -1}};
+}
+
+Status raw_sensors(const std::string& path, const std::string&, const SensorSink& sink) {
+  return read_raw_sensors(path, sink);
+}
+Status dat_sensors(const std::string& path, const std::string&, const SensorSink& sink) {
+  return read_dat_sensors(path, sink);
+}
+
+constexpr EventFormat kFormats[] = {
+    {"h5", ".h5 .hdf5", starts_as_hdf5, open_events_h5, list_h5_streams, nullptr},
+    {"metavision_h5", "", nullptr, open_events_h5, list_h5_streams, nullptr},
+    {"raw", ".raw", starts_as_raw, open_events_raw, list_raw_streams, raw_sensors},
+    {"dat", ".dat", starts_as_dat, open_events_dat, list_dat_streams, dat_sensors},
+    {"text", ".txt .csv", nullptr, open_events_text, list_text_streams, nullptr},
+};
+
+bool has_extension(const std::string& path, std::string_view extensions) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension.empty()) return false;
+  for (std::size_t at = 0; at < extensions.size();) {
+    const auto end = std::min(extensions.find(' ', at), extensions.size());
+    if (extensions.substr(at, end - at) == extension) return true;
+    at = end + 1;
+  }
+  return false;
+}
+
+const EventFormat& by_name(std::string_view name) {
+  return *std::find_if(std::begin(kFormats), std::end(kFormats),
+                       [&](const EventFormat& format) { return format.name == name; });
+}
+
+}  // namespace
+
+std::span<const EventFormat> event_formats() { return kFormats; }
+
+Expected<const EventFormat*> find_event_format(const std::string& path, const std::string& name) {
+  if (!name.empty()) {
+    std::string known;
+    for (const EventFormat& format : kFormats) {
+      if (format.name == name) return &format;
+      known += text(known.empty() ? "" : ", ", format.name);
+    }
+    return Error{path, "the event format '" + name + "' is unknown", "events.format is one of " + known};
+  }
+  auto bytes = ByteStream::open(path);
+  if (!bytes) return bytes.error();
+  const auto head = as_text(bytes->peek(kHeadBytes));
+  for (const EventFormat& format : kFormats)
+    if (format.recognises != nullptr && format.recognises(head)) return &format;
+  for (const EventFormat& format : kFormats)
+    if (has_extension(path, format.extensions)) return &format;
+  return &by_name("text");
+}
+
+}  // namespace evpose

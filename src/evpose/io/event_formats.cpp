@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "evpose/io/bag_reader.h"
+#include "evpose/io/bag_streams.h"
 #include "evpose/io/byte_stream.h"
 #include "evpose/io/events_dat.h"
 #include "evpose/io/events_h5.h"
@@ -41,6 +43,9 @@ constexpr EventFormat kFormats[] = {
     {"metavision_h5", "", nullptr, open_events_h5, list_h5_streams, nullptr},
     {"raw", ".raw", starts_as_raw, open_events_raw, list_raw_streams, raw_sensors},
     {"dat", ".dat", starts_as_dat, open_events_dat, list_dat_streams, dat_sensors},
+    {"rosbag1", ".bag", starts_as_rosbag1, open_events_bag, list_bag_streams, read_bag_sensors},
+    {"mcap", ".mcap", starts_as_mcap, open_events_bag, list_bag_streams, read_bag_sensors},
+    {"rosbag2", ".db3 .zstd", starts_as_rosbag2, open_events_bag, list_bag_streams, read_bag_sensors},
     {"text", ".txt .csv", nullptr, open_events_text, list_text_streams, nullptr},
 };
 
@@ -75,6 +80,7 @@ Expected<const EventFormat*> find_event_format(const std::string& path, const st
     }
     return Error{path, "the event format '" + name + "' is unknown", "events.format is one of " + known};
   }
+  if (is_rosbag2_folder(path)) return &by_name("rosbag2");
   auto bytes = ByteStream::open(path);
   if (!bytes) return bytes.error();
   const auto head = as_text(bytes->peek(kHeadBytes));

@@ -7,7 +7,12 @@
 #include "evpose/io/bag_reader.h"
 #include "evpose/io/bag_streams.h"
 #include "evpose/io/byte_stream.h"
+#include "evpose/io/events_aedat2.h"
+#include "evpose/io/events_aedat3.h"
+#include "evpose/io/events_aedat4.h"
+#include "evpose/io/events_bin40.h"
 #include "evpose/io/events_dat.h"
+#include "evpose/io/events_es.h"
 #include "evpose/io/events_h5.h"
 #include "evpose/io/events_raw.h"
 #include "evpose/io/events_text.h"
@@ -31,18 +36,23 @@ Expected<std::vector<StreamInfo>> list_text_streams(const std::string& path) {
   return std::vector<StreamInfo>{{StreamKind::events, "events", "text", -1}};
 }
 
-Status raw_sensors(const std::string& path, const std::string&, const SensorSink& sink) {
-  return read_raw_sensors(path, sink);
-}
-Status dat_sensors(const std::string& path, const std::string&, const SensorSink& sink) {
-  return read_dat_sensors(path, sink);
+/// Of files that have but one stream of a kind.
+template <Status (*kRead)(const std::string&, const SensorSink&)>
+Status only(const std::string& path, const std::string&, const SensorSink& sink) {
+  return kRead(path, sink);
 }
 
 constexpr EventFormat kFormats[] = {
     {"h5", ".h5 .hdf5", starts_as_hdf5, open_events_h5, list_h5_streams, nullptr},
     {"metavision_h5", "", nullptr, open_events_h5, list_h5_streams, nullptr},
-    {"raw", ".raw", starts_as_raw, open_events_raw, list_raw_streams, raw_sensors},
-    {"dat", ".dat", starts_as_dat, open_events_dat, list_dat_streams, dat_sensors},
+    {"raw", ".raw", starts_as_raw, open_events_raw, list_raw_streams, only<read_raw_sensors>},
+    {"dat", ".dat", starts_as_dat, open_events_dat, list_dat_streams, only<read_dat_sensors>},
+    {"aedat4", ".aedat4", starts_as_aedat4, open_events_aedat4, list_aedat4_streams, read_aedat4_sensors},
+    {"aedat3", "", starts_as_aedat3, open_events_aedat3, list_aedat3_streams, only<read_aedat3_sensors>},
+    {"aedat2", ".aedat", starts_as_aedat2, open_events_aedat2, list_aedat2_streams,
+     only<read_aedat2_sensors>},
+    {"es", ".es", starts_as_es, open_events_es, list_es_streams, nullptr},
+    {"bin40", ".bin", nullptr, open_events_bin40, list_bin40_streams, nullptr},
     {"rosbag1", ".bag", starts_as_rosbag1, open_events_bag, list_bag_streams, read_bag_sensors},
     {"mcap", ".mcap", starts_as_mcap, open_events_bag, list_bag_streams, read_bag_sensors},
     {"rosbag2", ".db3 .zstd", starts_as_rosbag2, open_events_bag, list_bag_streams, read_bag_sensors},

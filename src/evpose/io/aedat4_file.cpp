@@ -15,7 +15,7 @@ constexpr std::size_t kPacketHead = 8;
 /// No packet of a camera comes near.
 constexpr std::size_t kLargestHeader = 16 << 20, kLargestPayload = 256u << 20, kLargestMessage = 1u << 30;
 
-enum Compression { kNone = 0, kLz4 = 1, kLz4High = 2, kZstd = 3, kZstdHigh = 4 };
+enum StoredCompression { kNone = 0, kLz4 = 1, kLz4High = 2, kZstd = 3, kZstdHigh = 4 };
 
 /// The text of `<attr key="KEY" ...>TEXT<` in a piece of XML; empty if it is not there.
 std::string_view attribute(std::string_view xml, std::string_view key) {

@@ -91,6 +91,7 @@ Expected<const EventFormat*> find_event_format(const std::string& path, const st
     return Error{path, "the event format '" + name + "' is unknown", "events.format is one of " + known};
   }
   if (is_rosbag2_folder(path)) return &by_name("rosbag2");
+  if (is_rosbag2_folder(path)) return &by_name("rosbag2");
   auto bytes = ByteStream::open(path);
   if (!bytes) return bytes.error();
   const auto head = as_text(bytes->peek(kHeadBytes));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "evpose/io/event_reader.h"
+#include "evpose/io/event_writer.h"
 
 namespace evpose {
 
@@ -15,18 +16,16 @@ Expected<std::unique_ptr<EventReader>> open_events_h5(const std::string& path,
                                                       const EventReadOptions& options);
 
 /// Writes events.h5: i64 us, u16, u16, u8, chunks of 65,536, shuffle + deflate.
-class EventWriterH5 {
+class EventWriterH5 : public EventWriter {
  public:
-  /// `sensor` is free text. Nothing stands at `path` before finish().
+  /// `sensor` is free text.
   static Expected<EventWriterH5> create(const std::string& path, ImageSize size, const std::string& sensor);
   EventWriterH5(EventWriterH5&& other) noexcept;
   EventWriterH5& operator=(EventWriterH5&& other) noexcept;
-  ~EventWriterH5();
+  ~EventWriterH5() override;
 
-  /// Stamps are rounded down to microseconds. Events must be in order, within and between packets, and inside
-  /// the size: faults of ours.
-  Status append(const EventPacket& packet);
-  Status finish();
+  Status append(const EventPacket& packet) override;
+  Status finish() override;
 
  private:
   struct Impl;

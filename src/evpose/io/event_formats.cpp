@@ -7,6 +7,7 @@
 #include "evpose/io/bag_reader.h"
 #include "evpose/io/bag_streams.h"
 #include "evpose/io/byte_stream.h"
+#include "evpose/io/dataflash.h"
 #include "evpose/io/events_aedat2.h"
 #include "evpose/io/events_aedat3.h"
 #include "evpose/io/events_aedat4.h"
@@ -42,6 +43,11 @@ Status only(const std::string& path, const std::string&, const SensorSink& sink)
   return kRead(path, sink);
 }
 
+Expected<std::unique_ptr<EventReader>> no_events_in_dataflash(const std::string& path,
+                                                              const EventReadOptions&) {
+  return Error{path, "is an autopilot's log, which holds no events", "name a file of events"};
+}
+
 constexpr EventFormat kFormats[] = {
     {"h5", ".h5 .hdf5", starts_as_hdf5, open_events_h5, list_h5_streams, nullptr},
     {"metavision_h5", "", nullptr, open_events_h5, list_h5_streams, nullptr},
@@ -56,6 +62,8 @@ constexpr EventFormat kFormats[] = {
     {"rosbag1", ".bag", starts_as_rosbag1, open_events_bag, list_bag_streams, read_bag_sensors},
     {"mcap", ".mcap", starts_as_mcap, open_events_bag, list_bag_streams, read_bag_sensors},
     {"rosbag2", ".db3 .zstd", starts_as_rosbag2, open_events_bag, list_bag_streams, read_bag_sensors},
+    {"dataflash", "", starts_as_dataflash, no_events_in_dataflash, list_dataflash_streams,
+     read_dataflash_sensors},
     {"text", ".txt .csv", nullptr, open_events_text, list_text_streams, nullptr},
 };
 

@@ -25,12 +25,6 @@ constexpr std::size_t kHeadBytes = 64 << 10;
 
 bool starts_as_hdf5(std::string_view head) { return head.starts_with("\x89HDF\r\n\x1A\n"); }
 
-Expected<std::vector<StreamInfo>> list_h5_streams(const std::string& path) {
-  const auto reader = open_events_h5(path, {});
-  if (!reader) return reader.error();
-  return std::vector<StreamInfo>{{StreamKind::events, "events", "HDF5", (*reader)->extent().count}};
-}
-
 Expected<std::vector<StreamInfo>> list_text_streams(const std::string& path) {
   const auto reader = open_events_text(path, {});
   if (!reader) return reader.error();
@@ -49,8 +43,8 @@ Expected<std::unique_ptr<EventReader>> no_events_in_dataflash(const std::string&
 }
 
 constexpr EventFormat kFormats[] = {
-    {"h5", ".h5 .hdf5", starts_as_hdf5, open_events_h5, list_h5_streams, nullptr},
-    {"metavision_h5", "", nullptr, open_events_h5, list_h5_streams, nullptr},
+    {"h5", ".h5 .hdf5", starts_as_hdf5, open_events_h5, list_h5_streams, only<read_h5_sensors>},
+    {"metavision_h5", "", nullptr, open_events_h5, list_h5_streams, only<read_h5_sensors>},
     {"raw", ".raw", starts_as_raw, open_events_raw, list_raw_streams, only<read_raw_sensors>},
     {"dat", ".dat", starts_as_dat, open_events_dat, list_dat_streams, only<read_dat_sensors>},
     {"aedat4", ".aedat4", starts_as_aedat4, open_events_aedat4, list_aedat4_streams, read_aedat4_sensors},

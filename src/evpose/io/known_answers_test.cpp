@@ -2,10 +2,13 @@
 // Files of other makers' cameras and tools, of the shared data, against the answers that stand beside them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "evpose/core/log.h"
 #include "evpose/io/event_reader.h"
 #include "evpose/io/sensor_streams.h"
 #include "evpose/io/test_files.h"
@@ -256,6 +259,62 @@ TEST(KnownStreams, RawFilesWithoutTriggers) {
   const auto streams = list_streams(formats_folder() + "prophesee_evt2_gen3.raw");
   EXPECT_EQ(streams->front().type, "EVT2");
 }
+
+class CutFiles : public ::testing::TestWithParam<const char*> {};
+
+/// Events of a cut file are the first of the whole one, or there is an error that names the file.
+TEST_P(CutFiles, AreReadAsFarAsTheyGoOrRefused) {
+  EVPOSE_NEEDS_SHARED(formats_folder());
+  const std::string whole = content_of(formats_folder() + GetParam());
+  const Columns all = read_columns(GetParam());
+  const TemporaryFolder folder;
+  const std::size_t step = whole.size() < 2000 ? 1 : whole.size() / 150 + 1;
+  set_log_level(LogLevel::quiet);
+  std::size_t longest = 0;
+  for (std::size_t n = 0; n < whole.size(); n += step) {
+    const std::string path = folder.file(GetParam(), whole.substr(0, n));
+    const auto reader = open_events(path, "", {});
+    if (!reader) {
+      expect_no_harm(reader, path, n);
+      continue;
+    }
+    EventPacket packet;
+    std::size_t count = 0;
+    bool failed = false;
+    while (true) {
+      const auto more = (*reader)->next(packet);
+      if (!more) expect_no_harm(more, path, n);
+      failed = !more;
+      if (!more || !*more) break;
+      for (const Event& e : packet.events) {
+        ASSERT_LT(count, all.x.size()) << n;
+        ASSERT_TRUE(e.x == all.x[count] && e.y == all.y[count] && e.on == all.p[count]) << n;
+        ASSERT_EQ(static_cast<std::uint64_t>(packet.time(e) / kNsPerUs), all.t_us[count]) << n;
+        ++count;
+      }
+    }
+    if (failed) continue;
+    EXPECT_GE(count, longest) << n;
+    longest = count;
+  }
+  set_log_level(LogLevel::normal);
+  EXPECT_GT(longest, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Files, CutFiles,
+                         ::testing::Values("evt21_pattern_vector_little.raw",
+                                           "evt21_pattern_time_loop_legacy.raw",
+                                           "prophesee_evt2_gen3_cut.raw", "prophesee_evt3_gen41.raw",
+                                           "ncars_sample_dat_v2.dat", "dvxplorer_events_imu.aedat4",
+                                           "davis346_no_table_cut.aedat4", "event_stream_dvs_trcl0.es",
+                                           "aedat2_davis240c_events_imu_cut.aedat", "simple_raw_events.txt"),
+                         [](const auto& file) {
+                           std::string name = file.param;
+                           std::replace_if(
+                               name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; },
+                               '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace evpose

@@ -10,7 +10,7 @@
 #include "commands.h"
 #include "evpose/eval/score.h"
 #include "evpose/io/atomic_file.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/trajectory.h"
 #include "evpose/report/page.h"
 #include "evpose/report/summary.h"
 
@@ -58,9 +58,9 @@ std::string span_text(const std::vector<TimedPose>& trajectory) {
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 int eval(const EvalRequest& request) {
-  const auto estimate = read_tum(request.estimate);
+  const auto estimate = read_trajectory(request.estimate);
   if (!estimate) return bad_input(estimate.error());
-  const auto truth = read_tum(request.truth);
+  const auto truth = read_trajectory(request.truth);
   if (!truth) return bad_input(truth.error());
   if (truth->size() < 2) return bad_input({request.truth, "one pose is no trajectory", "give two or more"});
   const TrajectoryScore score = score_trajectory({*estimate, *truth, {}, {}, {}}, options_of(request));
@@ -89,8 +89,8 @@ void add_eval(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand("eval", "Judge a trajectory against ground truth");
   const auto request = std::make_shared<EvalRequest>();
   EvalRequest& r = *request;
-  command->add_option("estimate", r.estimate, "TUM file: t x y z qx qy qz qw")->required();
-  command->add_option("groundtruth", r.truth, "TUM file of the same frame and body")->required();
+  command->add_option("estimate", r.estimate, "trajectory: TUM, EuRoC or KITTI file, or a bag")->required();
+  command->add_option("groundtruth", r.truth, "one of the same frame and body")->required();
   command->add_option("--align", r.alignment, "what is fitted before errors are taken")
       ->check(CLI::IsMember(names(kAlignments)))
       ->capture_default_str();

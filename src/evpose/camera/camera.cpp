@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/camera/double_sphere.h"
 #include "evpose/camera/kannala_brandt.h"
 #include "evpose/camera/pinhole_radtan.h"
 
@@ -27,8 +28,15 @@ Status check_numbers(const CameraIntrinsics& c) {
 Status check_model(const CameraIntrinsics& c) {
   const std::string& model = c.distortion_model;
   const std::size_t n = c.distortion.size();
-  if (model != "radtan" && model != "equidistant" && model != "none")
-    return Error{"distortion_model", text("'", model, "' is not known"), "use radtan, equidistant or none"};
+  if (model != "radtan" && model != "equidistant" && model != "ds" && model != "none")
+    return Error{"distortion_model", text("'", model, "' is not implemented"),
+                 "calibrate with pinhole and radtan, equidistant or none, or with ds"};
+  if (model == "ds" && n != 2)
+    return Error{"distortion_coeffs", text("ds has 2 numbers, not ", n), "give xi alpha"};
+  if (model == "ds" &&
+      !(c.distortion[0] > -1 && c.distortion[0] <= 1 && c.distortion[1] >= 0 && c.distortion[1] <= 1))
+    return Error{"distortion_coeffs", text("ds has xi = ", c.distortion[0], ", alpha = ", c.distortion[1]),
+                 "xi lies between -1 and 1, alpha between 0 and 1"};
   if (model == "radtan" && n != 4 && n != 5)
     return Error{"distortion_coeffs", text("radtan has 4 or 5 numbers, not ", n), "give k1 k2 p1 p2 [k3]"};
   if (model == "equidistant" && n != 4)
@@ -59,6 +67,8 @@ Expected<std::shared_ptr<const Camera>> make_camera(const CameraIntrinsics& intr
   std::shared_ptr<const Camera> camera;
   if (intrinsics.distortion_model == "equidistant") {
     camera = std::make_shared<KannalaBrandt>(intrinsics);
+  } else if (intrinsics.distortion_model == "ds") {
+    camera = std::make_shared<DoubleSphere>(intrinsics);
   } else {
     camera = std::make_shared<PinholeRadtan>(intrinsics);
   }

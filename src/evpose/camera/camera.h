@@ -44,15 +44,15 @@ class Camera {
   virtual ImageSize size() const = 0;
   /// Pixels per radian at the image centre.
   virtual double focal_px() const = 0;
-  /// Kalibr's words: "pinhole-radtan", "pinhole-equidistant", "pinhole-none".
+  /// Kalibr's words: "pinhole-radtan", "pinhole-equidistant", "pinhole-none", "ds-none".
   virtual std::string model() const = 0;
 };
 
 /// Kalibr's `intrinsics` and `distortion_coeffs` of one camera.
 struct CameraIntrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< px
-  std::string distortion_model;           ///< "radtan", "equidistant" or "none"
-  std::vector<double> distortion;         ///< radtan: k1 k2 p1 p2 [k3]; equidistant: k1 k2 k3 k4; none: empty
+  std::string distortion_model;           ///< "radtan", "equidistant", "ds" (double sphere) or "none"
+  std::vector<double> distortion;  ///< radtan: k1 k2 p1 p2 [k3]; equidistant: k1 k2 k3 k4; ds: xi alpha
   ImageSize size;
 };
 

@@ -43,6 +43,8 @@ std::vector<Named> cameras() {
        camera("equidistant", {-0.0480314, 0.0113310, -0.0553782, 0.0215010}, 226.4, {346, 260})},
       {"ideal equidistant", camera("equidistant", {0, 0, 0, 0}, 200)},
       {"fisheye of 200 degrees", camera("equidistant", {-0.01, 0.002, -0.001, 0.0001}, 170)},
+      {"EuRoC double sphere", camera("ds", {-0.2409573942178872, 0.566996899163044}, 349.8, {752, 480})},
+      {"double sphere, small alpha", camera("ds", {0.3, 0.4}, 300)},
   };
 }
 
@@ -78,8 +80,8 @@ TEST(Camera, ProjectThenUnprojectReturnsTheRayOverTheWholeDomain) {
   std::uniform_real_distribution<double> u(0, 1);
   for (const Named& c : cameras()) {
     // A pinhole's pixels beyond 80 degrees are millions of px away, where 1e-9 px cannot be told apart.
-    const bool pinhole = c.camera->model() != "pinhole-equidistant";
-    const double limit = pinhole ? std::min(c.camera->valid_angle(), 80 * kDegree) : c.camera->valid_angle();
+    const bool bounded = c.camera->model() == "pinhole-equidistant";
+    const double limit = bounded ? c.camera->valid_angle() : std::min(c.camera->valid_angle(), 80 * kDegree);
     for (int i = 0; i < 2000; ++i) {
       const Eigen::Vector3d direction = ray(0.99 * limit * u(random), 2 * std::numbers::pi * u(random));
       const auto pixel = c.camera->project(std::exp(4 * u(random) - 2) * direction);
@@ -168,6 +170,21 @@ TEST(Camera, EquidistantMatchesTheFormulaByHand) {
   EXPECT_NEAR(pixel->y(), 160 * radius + 60, 1e-11);
 }
 
+TEST(Camera, DoubleSphereMatchesTheFormulaByHand) {
+  const auto c = make_camera({100, 200, 50, 60, "ds", {-0.5, 0.75}, {101, 121}});
+  ASSERT_TRUE(c);
+  // (3, 4, 12): d1 = 13, xi d1 + z = 5.5, d2 = sqrt(25 + 30.25); the denominator 0.75 d2 + 0.25 * 5.5.
+  const double denominator = 0.75 * std::sqrt(55.25) + 0.25 * 5.5;
+  const auto pixel = (*c)->project({3, 4, 12});
+  ASSERT_TRUE(pixel);
+  EXPECT_NEAR(pixel->x(), 300 / denominator + 50, 1e-11);
+  EXPECT_NEAR(pixel->y(), 800 / denominator + 60, 1e-11);
+  // Without spheres it is the pinhole.
+  const auto none = camera("none", {}), ds = camera("ds", {0, 0});
+  EXPECT_LT((*ds->project({0.3, -0.2, 1.1}) - *none->project({0.3, -0.2, 1.1})).norm(), 1e-11);
+  EXPECT_EQ((*c)->model(), "ds-none");
+}
+
 TEST(Camera, DomainEndsAtTheValidAngle) {
   for (const Named& c : cameras()) {
     const double edge = c.camera->valid_angle();
@@ -238,6 +255,11 @@ TEST(Camera, BadIntrinsicsAreRefusedByName) {
             }),
             "distortion_coeffs");
   EXPECT_EQ(where([](auto& c) { c.distortion_model = "none"; }), "distortion_coeffs");
+  EXPECT_EQ(where([](auto& c) { c.distortion_model = "ds"; }), "distortion_coeffs");
+  EXPECT_EQ(where([](auto& c) {
+              c.distortion_model = "ds", c.distortion = {0.1, 1.5};
+            }),
+            "distortion_coeffs");
 }
 
 }  // namespace

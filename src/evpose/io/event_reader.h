@@ -48,8 +48,9 @@ class EventReader {
   virtual EventExtent extent() const = 0;
 };
 
-/// `format`: "h5", "text", or empty: by the file's first bytes. Errors: no such file, not that format,
-/// truncated, a filter that is not installed, no events, unknown time unit.
+/// `format`: a name of event_formats.h, such as "h5", "raw" or "text"; or empty: by the file's first bytes,
+/// then its extension. Errors: no such file, not that format, truncated, a filter that is not installed, no
+/// events, unknown time unit.
 Expected<std::unique_ptr<EventReader>> open_events(const std::string& path, const std::string& format,
                                                    const EventReadOptions& options);
 

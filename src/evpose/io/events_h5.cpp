@@ -2,10 +2,13 @@
 #include "evpose/io/events_h5.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "evpose/io/event_packer.h"
+#include "evpose/io/event_rows.h"
 #include "evpose/io/hdf5_file.h"
 
 namespace evpose {
@@ -44,7 +47,6 @@ Expected<Columns> open_columns(const Hdf5File& file) {
                         columns.t.rows()),
                    "the file is incomplete; copy it again"};
   }
-  if (columns.t.rows() == 0) return Error{file.path(), "holds no events", "record again"};
   return columns;
 }
 
@@ -72,6 +74,9 @@ class Clock {
       return Error{file.path() + ": /t_offset", text(clock.offset_us_, " us is out of range"), "correct it"};
     return clock;
   }
+
+  const std::string& unit() const { return unit_; }
+  std::int64_t offset_us() const { return offset_us_; }
 
   Status read(const Hdf5Dataset& t, std::uint64_t first, std::uint64_t count,
               std::vector<std::int64_t>& out) {
@@ -109,22 +114,80 @@ class Clock {
   std::vector<double> floats_;
 };
 
+Expected<ImageSize> stored_size(const Hdf5File& file) {
+  const auto width = file.attribute_numbers("/", "width"), height = file.attribute_numbers("/", "height");
+  if (!width || !height || width->size() != 1 || height->size() != 1) return ImageSize{};
+  const double w = width->front(), h = height->front();
+  if (!(w >= 1 && w <= 65536 && h >= 1 && h <= 32768))
+    return Error{file.path(), text("attributes width and height are ", w, " and ", h), "correct them"};
+  return ImageSize{static_cast<int>(w), static_cast<int>(h)};
+}
+
+class ColumnRows : public EventRows {
+ public:
+  static Expected<std::unique_ptr<EventRows>> open(const Hdf5File& file, const std::string& unit) {
+    auto columns = open_columns(file);
+    if (!columns) return columns.error();
+    auto clock = Clock::make(file, *columns, unit);
+    if (!clock) return clock.error();
+    const auto size = stored_size(file);
+    if (!size) return size.error();
+    auto rows = std::unique_ptr<ColumnRows>(new ColumnRows(*std::move(columns), *std::move(clock), *size));
+    if (file.has("/ms_to_idx"))
+      if (auto index = file.dataset("/ms_to_idx", 1)) rows->index_ = *std::move(index);
+    return std::unique_ptr<EventRows>(std::move(rows));
+  }
+
+  std::uint64_t count() const override { return columns_.t.rows(); }
+  ImageSize size() const override { return size_; }
+
+  Status stamps(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& t_us) override {
+    return clock_.read(columns_.t, first, count, t_us);
+  }
+
+  Status pixels(std::uint64_t first, std::uint64_t count, RawEvents& out) override {
+    for (const auto& [dataset, column] :
+         {std::pair(&columns_.x, &out.x), std::pair(&columns_.y, &out.y), std::pair(&columns_.p, &out.p)}) {
+      column->resize(count);
+      if (auto status = dataset->read(NumberType::i32, first, count, column->data()); !status) return status;
+    }
+    return {};
+  }
+
+  std::pair<std::uint64_t, std::uint64_t> near(std::int64_t t_us) override {
+    const std::int64_t ms = (t_us - clock_.offset_us()) / 1000;
+    if (!index_ || clock_.unit() != "us" || ms < 0 || index_->rows() < 2) return {0, count()};
+    const std::uint64_t last = index_->rows() - 1, entry = std::min(static_cast<std::uint64_t>(ms), last);
+    std::array<std::uint64_t, 2> rows = {0, count()};
+    const std::uint64_t known = entry < last ? 2 : 1;
+    if (!index_->read(NumberType::u64, entry, known, rows.data())) return {0, count()};
+    return {std::min(rows[0], count()), std::min(rows[1], count())};
+  }
+
+ private:
+  ColumnRows(Columns columns, Clock clock, ImageSize size)
+      : columns_(std::move(columns)), clock_(std::move(clock)), size_(size) {}
+
+  Columns columns_;
+  Clock clock_;
+  ImageSize size_;
+  std::optional<Hdf5Dataset> index_;  ///< /ms_to_idx: number of the first event of each millisecond
+};
+
 /// What all members of one open file share.
 struct Source {
   Hdf5File file;
-  Columns columns;
-  Clock clock;
+  std::unique_ptr<EventRows> rows;
   std::uint64_t row = 0;
 
-  Expected<std::int64_t> stamp(std::uint64_t i) {
+  Expected<std::int64_t> stamp(std::uint64_t i) const {
     std::vector<std::int64_t> one;
-    if (auto status = clock.read(columns.t, i, 1, one); !status) return status.error();
+    if (auto status = rows->stamps(i, 1, one); !status) return status.error();
     return one[0];
   }
 
-  /// First row at or after a time, by bisection.
-  Expected<std::uint64_t> first_at(std::int64_t t_us) {
-    std::uint64_t low = 0, high = columns.t.rows();
+  /// First row in [low, high] at or after a time, by bisection; `high` if there is none before it.
+  Expected<std::uint64_t> first_between(std::uint64_t low, std::uint64_t high, std::int64_t t_us) const {
     while (low < high) {
       const std::uint64_t middle = low + (high - low) / 2;
       const auto t = stamp(middle);
@@ -138,16 +201,23 @@ struct Source {
     return low;
   }
 
-  Expected<bool> fetch(RawEvents& out) {
-    const std::uint64_t count = std::min(kBlockRows, columns.t.rows() - row);
-    out.first_row = static_cast<std::int64_t>(row);
-    if (auto status = clock.read(columns.t, row, count, out.t_us); !status) return status.error();
-    for (const auto& [dataset, column] :
-         {std::pair(&columns.x, &out.x), std::pair(&columns.y, &out.y), std::pair(&columns.p, &out.p)}) {
-      column->resize(count);
-      if (auto status = dataset->read(NumberType::i32, row, count, column->data()); !status)
-        return status.error();
+  /// First row at or after a time. An index is believed as far as the stamps agree with it.
+  Expected<std::uint64_t> first_at(std::int64_t t_us) const {
+    const auto [low, high] = rows->near(t_us);
+    if (low > 0 || high < rows->count()) {
+      const auto before = low > 0 ? stamp(low - 1) : Expected<std::int64_t>(t_us - 1);
+      const auto after = high < rows->count() ? stamp(high) : Expected<std::int64_t>(t_us);
+      if (low <= high && before && after && *before < t_us && *after >= t_us)
+        return first_between(low, high, t_us);
     }
+    return first_between(0, rows->count(), t_us);
+  }
+
+  Expected<bool> fetch(RawEvents& out) {
+    const std::uint64_t count = std::min(kBlockRows, rows->count() - row);
+    out.first_row = static_cast<std::int64_t>(row);
+    if (auto status = rows->stamps(row, count, out.t_us); !status) return status.error();
+    if (auto status = rows->pixels(row, count, out); !status) return status.error();
     row += count;
     return count > 0;
   }
@@ -168,17 +238,8 @@ class EventReaderH5 : public EventReader {
   EventExtent extent_;
 };
 
-Expected<ImageSize> stored_size(const Hdf5File& file) {
-  const auto width = file.attribute_numbers("/", "width"), height = file.attribute_numbers("/", "height");
-  if (!width || !height || width->size() != 1 || height->size() != 1) return ImageSize{};
-  const double w = width->front(), h = height->front();
-  if (!(w >= 1 && w <= 65536 && h >= 1 && h <= 32768))
-    return Error{file.path(), text("attributes width and height are ", w, " and ", h), "correct them"};
-  return ImageSize{static_cast<int>(w), static_cast<int>(h)};
-}
-
-Expected<EventExtent> extent_of(Source& source, const EventReadOptions& options) {
-  const std::uint64_t rows = source.columns.t.rows();
+Expected<EventExtent> extent_of(const Source& source, const EventReadOptions& options) {
+  const std::uint64_t rows = source.rows->count();
   const auto first = source.stamp(0), last = source.stamp(rows - 1);
   if (!first) return first.error();
   if (!last) return last.error();
@@ -200,24 +261,29 @@ Expected<EventExtent> extent_of(Source& source, const EventReadOptions& options)
                      static_cast<std::int64_t>(rows)};
 }
 
+Expected<std::unique_ptr<EventRows>> open_rows(const Hdf5File& file, const EventReadOptions& options) {
+  const bool metavision = file.has("/CD/events");
+  if (!metavision && mvsec_events(file, options.topic).empty())
+    return ColumnRows::open(file, options.time_unit);
+  const std::string unit = metavision ? "us" : "s";
+  if (!options.time_unit.empty() && options.time_unit != unit)
+    return Error{file.path(),
+                 "events.time_unit '" + options.time_unit + "': this format's stamps are in " + unit,
+                 "leave events.time_unit out"};
+  return metavision ? open_metavision_rows(file) : open_mvsec_rows(file, options.topic);
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<EventReader>> open_events_h5(const std::string& path,
                                                       const EventReadOptions& options) {
   auto file = Hdf5File::open(path);
   if (!file) return file.error();
-  auto columns = open_columns(*file);
-  if (!columns) return columns.error();
-  auto clock = Clock::make(*file, *columns, options.time_unit);
-  if (!clock) return clock.error();
-  ImageSize size = options.size;
-  if (size == ImageSize{}) {
-    const auto stored = stored_size(*file);
-    if (!stored) return stored.error();
-    size = *stored;
-  }
-  auto source = std::make_unique<Source>(
-      Source{.file = *std::move(file), .columns = *std::move(columns), .clock = *std::move(clock)});
+  auto rows = open_rows(*file, options);
+  if (!rows) return rows.error();
+  if ((*rows)->count() == 0) return Error{path, "holds no events", "record again"};
+  const ImageSize size = options.size != ImageSize{} ? options.size : (*rows)->size();
+  auto source = std::make_unique<Source>(Source{.file = *std::move(file), .rows = *std::move(rows)});
   const auto extent = extent_of(*source, options);
   if (!extent) return extent.error();
   auto packer = EventPacker::make(path, options, size,

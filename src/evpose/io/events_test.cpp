@@ -228,7 +228,8 @@ TEST(EventsH5, ErrorsSayWhatWhereAndWhatToDo) {
   EXPECT_TRUE(says(read_all(folder / "none.h5").error, {"none.h5", "no such file"}));
   EXPECT_TRUE(says(read_all(folder.file("empty.h5", "")).error, {"empty"}));
   EXPECT_TRUE(says(read_all(folder.file("text.h5", "1 2 3 0\n")).error, {"not an HDF5 file"}));
-  EXPECT_TRUE(says(read_all(folder.file("a.raw", "x"), {}, "raw").error, {"'raw'", "convert"}));
+  EXPECT_TRUE(says(read_all(folder.file("a.raw", "x"), {}, "raw").error, {"a.raw", "header of a RAW file"}));
+  EXPECT_TRUE(says(read_all(folder.file("a.raw", "x"), {}, "row").error, {"'row'", "one of h5, "}));
   EventReadOptions flip;
   flip.flip_x = true;
   EXPECT_TRUE(says(read_all(h5_file<std::int64_t>(folder, NumberType::i64, {1, 2, 3}, x, p), flip).error,
@@ -305,6 +306,26 @@ TEST(EventsText, TruncationAnywhereIsAnswered) {
     const Stream s = read_all(folder.file("cut.csv", whole.substr(0, n)));
     EXPECT_TRUE(!s.rows.empty() || says(s.error, {"cut.csv"})) << n;
   }
+}
+
+TEST(EventsText, TheCommonWayOfWritingMeansWhatEveryOtherMeans) {
+  const TemporaryFolder folder;
+  // Each line but the first in one way, and the same with blanks doubled, which only the general way reads.
+  const std::vector<std::string> times = {"0.000001",    "0.5",   "0.50000099",   "1.",
+                                          "2.000000000", "12.25", "1000000000.1", "1000000001.000001999999"};
+  std::string plain, other;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const std::string number = std::to_string(100 * i + i);
+    plain += times[i] + " " + number + " 7 " + (i % 2 == 0 ? "1\n" : "0\n");
+    other += "  " + times[i] + "  " + number + "\t7.0 " + (i % 2 == 0 ? "1.0 \r\n" : "0.0 \r\n");
+  }
+  const Stream a = read_all(folder.file("a.txt", plain)), b = read_all(folder.file("b.txt", other));
+  EXPECT_EQ(a.error, "");
+  EXPECT_EQ(b.error, "");
+  EXPECT_TRUE(a.rows == b.rows);
+  ASSERT_EQ(a.rows.size(), times.size());
+  EXPECT_EQ(a.rows[2].t, 500'000'000);
+  EXPECT_EQ(a.rows.back(), (Row{1'000'000'001'000'001'000, 707, 7, false}));
 }
 
 TEST(Events, SharedRecordingsHaveTheKnownCounts) {

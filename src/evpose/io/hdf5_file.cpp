@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "evpose/io/atomic_file.h"
+#include "evpose/io/hdf5_filters.h"
 #include "evpose/io/input_file.h"
 
 namespace evpose {
@@ -16,7 +17,10 @@ namespace {
 
 static_assert(std::is_same_v<hid_t, std::int64_t>, "Hdf5Handle holds identifiers as 64-bit numbers");
 
-void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void prepare() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  register_hdf5_filters();
+}
 
 Hdf5Handle own(hid_t id, herr_t (*close)(hid_t)) { return {id, close}; }
 
@@ -135,7 +139,7 @@ bool Hdf5Handle::reset() {
 std::size_t size_of(NumberType type) { return H5Tget_size(memory_type(type)); }
 
 Expected<Hdf5File> Hdf5File::open(const std::string& path) {
-  silence();
+  prepare();
   const auto plain = open_to_read(path);
   if (!plain) return plain.error();
   if (plain->size == 0) return Error{path, "the file is empty", "copy it again"};
@@ -152,7 +156,7 @@ Expected<Hdf5File> Hdf5File::open(const std::string& path) {
 }
 
 Expected<Hdf5File> Hdf5File::create(const TemporaryFile& temporary) {
-  silence();
+  prepare();
   Hdf5File file;
   file.path_ = temporary.target();
   const auto access = own(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
@@ -204,22 +208,14 @@ std::vector<std::string> Hdf5File::datasets() const {
   return names;
 }
 
-Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions) const {
+/// What datasets of numbers and tables have in common: everything but their type.
+Status Hdf5File::open_dataset(const std::string& name, int dimensions, Hdf5Dataset& out) const {
   const std::string where = path_ + ": " + name;
   if (!has(name)) return Error{path_, "no dataset " + name, "is it the right file?"};
-  Hdf5Dataset out;
   out.path_ = path_;
   out.name_ = name;
   out.id_ = own(H5Dopen2(id_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
   if (!out.id_) return Error{where, "is not a readable dataset", "copy the file again"};
-  const auto type = own(H5Dget_type(out.id_.get()), H5Tclose);
-  const H5T_class_t kind = H5Tget_class(type.get());
-  if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM)
-    return Error{where, "does not hold numbers", "is it the right file?"};
-  const auto number = number_type(type.get());
-  if (!number)
-    return Error{where, "holds numbers of an unusual type", "use integers and floats of 8 to 64 bits"};
-  out.type_ = *number;
   const auto space = own(H5Dget_space(out.id_.get()), H5Sclose);
   const int rank = H5Sget_simple_extent_ndims(space.get());
   if (rank < 0 || (dimensions >= 0 && rank != dimensions))
@@ -231,20 +227,68 @@ Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions)
   if (const std::string filter = missing_filter(properties.get()); !filter.empty())
     return Error{where, "is compressed with " + filter + ", which is not installed",
                  "install that HDF5 plug-in, or rewrite the file by h5repack -f GZIP=4"};
+  const auto type = own(H5Dget_type(out.id_.get()), H5Tclose);
   // Deflate makes at most 1032 bytes of one; anything beyond is a damaged header, or content that was never
   // written.
   double bytes = static_cast<double>(H5Tget_size(type.get()));
   const double most = size_ > 0 ? 1100.0 * static_cast<double>(size_) : std::numeric_limits<double>::max();
-  if (chunk_bytes(properties.get(), static_cast<std::size_t>(bytes)) > std::min(most, 1e9))
+  const double chunk = chunk_bytes(properties.get(), static_cast<std::size_t>(bytes));
+  if (chunk > std::min(most, 1e9))
     return Error{where, "has larger chunks than the file can hold", "the file is damaged; copy it again"};
+  out.chunk_bytes_ = static_cast<std::size_t>(chunk);
   for (const auto n : out.shape_) bytes *= static_cast<double>(n);
   if (bytes > most)
     return Error{where, text("claims ", bytes, " bytes, the file has ", size_),
                  "the file is damaged; copy it again"};
+  return {};
+}
+
+Expected<Hdf5Dataset> Hdf5File::dataset(const std::string& name, int dimensions) const {
+  const std::string where = path_ + ": " + name;
+  Hdf5Dataset out;
+  if (auto status = open_dataset(name, dimensions, out); !status) return status.error();
+  const auto type = own(H5Dget_type(out.id_.get()), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(type.get());
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM)
+    return Error{where, "does not hold numbers", "is it the right file?"};
+  const auto number = number_type(type.get());
+  if (!number)
+    return Error{where, "holds numbers of an unusual type", "use integers and floats of 8 to 64 bits"};
+  out.type_ = *number;
   return out;
 }
 
+Expected<Hdf5Dataset> Hdf5File::table(const std::string& name, std::span<const Hdf5Field> fields,
+                                      std::size_t row_bytes) const {
+  const std::string where = path_ + ": " + name;
+  Hdf5Dataset out;
+  if (auto status = open_dataset(name, 1, out); !status) return status.error();
+  const auto type = own(H5Dget_type(out.id_.get()), H5Tclose);
+  if (H5Tget_class(type.get()) != H5T_COMPOUND)
+    return Error{where, "is not a table", "is it the right file?"};
+  out.row_type_ = own(H5Tcreate(H5T_COMPOUND, row_bytes), H5Tclose);
+  for (const Hdf5Field& field : fields) {
+    const int index = H5Tget_member_index(type.get(), field.name);
+    const H5T_class_t kind =
+        index < 0 ? H5T_NO_CLASS : H5Tget_member_class(type.get(), static_cast<unsigned>(index));
+    if (kind != H5T_INTEGER && kind != H5T_FLOAT)
+      return Error{where, text("its rows have no number '", field.name, "'"), "is it the right file?"};
+    H5Tinsert(out.row_type_.get(), field.name, field.offset, memory_type(field.type));
+  }
+  return out;
+}
+
+Status Hdf5Dataset::read_rows(std::uint64_t first, std::uint64_t count, void* out) const {
+  EVPOSE_CHECK(static_cast<bool>(row_type_));
+  return read_as(row_type_.get(), first, count, out);
+}
+
 Status Hdf5Dataset::read(NumberType type, std::uint64_t first, std::uint64_t count, void* out) const {
+  return read_as(memory_type(type), first, count, out);
+}
+
+Status Hdf5Dataset::read_as(std::int64_t memory_type, std::uint64_t first, std::uint64_t count,
+                            void* out) const {
   const std::uint64_t all = rows();
   EVPOSE_CHECK(first <= all && count <= all - first);
   if (count == 0) return {};
@@ -258,8 +302,9 @@ Status Hdf5Dataset::read(NumberType type, std::uint64_t first, std::uint64_t cou
     memory_space = own(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
   }
   const hid_t memory = shape_.empty() ? H5S_ALL : memory_space.get();
-  if (H5Dread(id_.get(), memory_type(type), memory, shape_.empty() ? H5S_ALL : file_space.get(), H5P_DEFAULT,
-              out) < 0)
+  const Hdf5ChunkBytes chunk(chunk_bytes_);
+  if (H5Dread(id_.get(), memory_type, memory, shape_.empty() ? H5S_ALL : file_space.get(), H5P_DEFAULT, out) <
+      0)
     return Error{path_ + ": " + name_, text("rows ", first, " to ", first + count - 1, " cannot be read"),
                  "the file is truncated or damaged; copy it again"};
   return {};

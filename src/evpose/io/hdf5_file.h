@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,13 @@ std::size_t size_of(NumberType type);
 
 using Hdf5Shape = std::vector<std::uint64_t>;
 
+/// A member of the rows of a table, and where it goes in the row in memory.
+struct Hdf5Field {
+  const char* name;
+  std::size_t offset;
+  NumberType type;
+};
+
 /// A dataset open to be read, its filters available. Errors name file and dataset.
 class Hdf5Dataset {
  public:
@@ -49,13 +57,18 @@ class Hdf5Dataset {
 
   /// Rows [first, first + count), as `type`, in C order.
   Status read(NumberType type, std::uint64_t first, std::uint64_t count, void* out) const;
+  /// Of a table: rows [first, first + count), as the fields say.
+  Status read_rows(std::uint64_t first, std::uint64_t count, void* out) const;
   bool has_attribute(const std::string& name) const;
   std::optional<std::uint32_t> attribute_u32(const std::string& name) const;
 
  private:
   friend class Hdf5File;
+  Status read_as(std::int64_t memory_type, std::uint64_t first, std::uint64_t count, void* out) const;
+
   std::string path_, name_;
-  Hdf5Handle id_;
+  Hdf5Handle id_, row_type_;     ///< the latter of tables
+  std::size_t chunk_bytes_ = 0;  ///< of a whole chunk, unpacked; 0: there are none
   Hdf5Shape shape_;
   NumberType type_ = NumberType::f64;
 };
@@ -79,6 +92,10 @@ class Hdf5File {
   /// Errors: absent, not numbers, more than `dimensions` (any if -1), compressed with a filter that is not
   /// installed, more content than the file can hold.
   Expected<Hdf5Dataset> dataset(const std::string& name, int dimensions = -1) const;
+  /// A one-dimensional dataset whose rows have all these fields, `row_bytes` each in memory. Errors:
+  /// likewise.
+  Expected<Hdf5Dataset> table(const std::string& name, std::span<const Hdf5Field> fields,
+                              std::size_t row_bytes) const;
 
   bool has_attribute(const std::string& object, const std::string& name) const;
   std::optional<std::vector<double>> attribute_numbers(const std::string& object,
@@ -103,6 +120,7 @@ class Hdf5File {
 
  private:
   Error failed(const std::string& what) const;
+  Status open_dataset(const std::string& name, int dimensions, Hdf5Dataset& out) const;
 
   std::string path_;
   std::int64_t size_ = 0;

@@ -57,17 +57,19 @@ Status take_files(const RecordingOverrides& overrides, Recording& r) {
 }
 
 Status take_calibration(const RecordingOverrides& overrides, Recording& r, double& timeshift_s) {
-  const auto camera = read_kalibr_camera(r.calibration_path, overrides.camera_index);
+  const auto calibration = read_calibration(r.calibration_path);
+  if (!calibration) return calibration.error();
+  const auto camera = choose_camera(*calibration, overrides.camera_index);
   if (!camera) return camera.error();
-  r.camera = camera->intrinsics;
-  r.T_cam_body = camera->T_cam_body;
+  r.camera = *camera->intrinsics;
+  r.T_cam_body = camera->T_cam_imu.value_or(Pose{});
   timeshift_s = camera->timeshift_cam_imu_s;
   if (!r.has_imu) return {};
-  if (!camera->has_extrinsics)
+  if (!camera->T_cam_imu)
     return Error{r.calibration_path,
                  text("no T_cam_imu for cam", overrides.camera_index, ", but there is an IMU"),
                  "calibrate camera and IMU together, or remove " + r.imu_path + " to track without it"};
-  const auto noise = read_kalibr_imu(r.imu_model_path);
+  const auto noise = read_imu_noise(r.imu_model_path);
   if (!noise) return noise.error();
   r.imu_noise = *noise;
   return {};

@@ -32,10 +32,9 @@ struct Parts {
       packet.events.push_back(
           make_event(i * 1000, static_cast<int>(i % 64), static_cast<int>(i % 48), i % 2 == 0));
     EXPECT_TRUE(writer->append(packet).ok() && writer->finish().ok());
-    KalibrCamera camera;
-    camera.intrinsics = {60, 60, 31.5, 23.5, "none", {}, {64, 48}};
-    camera.has_extrinsics = extrinsics;
-    camera.T_cam_body.p = {0.1, 0, 0};
+    CalibratedCamera camera;
+    camera.intrinsics = CameraIntrinsics{60, 60, 31.5, 23.5, "none", {}, {64, 48}};
+    if (extrinsics) camera.T_cam_imu = Pose{Eigen::Quaterniond::Identity(), {0.1, 0, 0}};
     camera.timeshift_cam_imu_s = 0.002;
     EXPECT_TRUE(write_kalibr_camera(folder + "/camchain-imucam.yaml", camera).ok());
     if (imu) write_imu(folder);

@@ -9,7 +9,7 @@
 #include "evpose/io/contour_files.h"
 #include "evpose/io/events_h5.h"
 #include "evpose/io/imu_csv.h"
-#include "evpose/io/kalibr.h"
+#include "evpose/io/calibration.h"
 #include "evpose/io/map_h5.h"
 #include "evpose/io/ply.h"
 #include "evpose/io/recording_yaml.h"
@@ -129,7 +129,7 @@ TEST(SpoiltFiles, Yaml) {
         "cam0:\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [0.1, 0.2, 0, 0]\n"
         "  intrinsics: [100, 100, 50, 40]\n  resolution: [100, 80]\n"
         "  T_cam_imu: [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n",
-        200, [](const std::string& path) { return read_kalibr_camera(path); });
+        200, [](const std::string& path) { return read_calibration(path); });
   spoil("recording.yaml",
         "version: 1\nfiles: {events: a.h5}\nevents: {flip_x: true, resolution: [6, 4]}\nimu: {columns: [a, "
         "b]}\n"

@@ -125,10 +125,12 @@ Expected<bool> YamlDocument::boolean(const YamlNode& node, const std::string& ke
 
 Expected<std::vector<double>> YamlDocument::numbers(const YamlNode& node, const std::string& key,
                                                     std::size_t count) const {
-  if (node.kind != YamlNode::Kind::list)
+  const YamlNode* data = node.find("data");
+  const YamlNode& list = data != nullptr ? *data : node;
+  if (list.kind != YamlNode::Kind::list)
     return error(node, key + ": a list is expected", "write [a, b, ...]");
   std::vector<const YamlNode*> leaves;
-  flatten(node, leaves);
+  flatten(list, leaves);
   if (count != 0 && leaves.size() != count)
     return error(node, text(key, ": ", leaves.size(), " numbers instead of ", count), "correct the list");
   std::vector<double> out;
@@ -141,19 +143,27 @@ Expected<std::vector<double>> YamlDocument::numbers(const YamlNode& node, const 
 }
 
 Expected<Pose> YamlDocument::transform(const YamlNode& node, const std::string& key) const {
-  auto values = numbers(node, key, 16);
+  auto values = numbers(node, key);
   if (!values) return values.error();
+  if (values->size() == 12) values->insert(values->end(), {0, 0, 0, 1});
+  if (values->size() != 16)
+    return error(node, text(key, ": ", values->size(), " numbers instead of 16 or 12"),
+                 "give a rigid transform, row by row");
   const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values->data());
-  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+  if ((T.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9)
+    return error(node, key + ": the last row is not 0 0 0 1", "give a rigid transform, row by row");
+  return rigid(node, key, T.topLeftCorner<3, 3>(), T.topRightCorner<3, 1>());
+}
+
+Expected<Pose> YamlDocument::rigid(const YamlNode& node, const std::string& key, const Eigen::Matrix3d& R,
+                                   const Eigen::Vector3d& p) const {
   const double off = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (off > 1e-3 || R.determinant() < 0)
+  if (!(off <= 1e-3) || R.determinant() < 0)
     return error(node,
                  text(key, ": its rotation is off an orthonormal matrix by ", off,
                       R.determinant() < 0 ? " and mirrors" : ""),
                  "give a rigid transform, row by row");
-  if ((T.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9)
-    return error(node, key + ": the last row is not 0 0 0 1", "give a rigid transform, row by row");
-  return Pose{Eigen::Quaterniond(R).normalized(), T.topRightCorner<3, 1>()};
+  return Pose{Eigen::Quaterniond(R).normalized(), p};
 }
 
 }  // namespace evpose

@@ -44,11 +44,15 @@ struct YamlDocument {
   Expected<double> number(const YamlNode& node, const std::string& key) const;  ///< finite
   Expected<std::int64_t> integer(const YamlNode& node, const std::string& key) const;
   Expected<bool> boolean(const YamlNode& node, const std::string& key) const;
-  /// A list of `count` numbers, also nested (rows of a matrix); any count if `count` is 0.
+  /// A list of `count` numbers, also nested (rows of a matrix) or as {rows, cols, data}; any count if `count`
+  /// is 0.
   Expected<std::vector<double>> numbers(const YamlNode& node, const std::string& key,
                                         std::size_t count = 0) const;
-  /// 4x4, in rows or flat; rigid to 1e-3.
+  /// 4x4 or 3x4, in rows or flat; rigid to 1e-3.
   Expected<Pose> transform(const YamlNode& node, const std::string& key) const;
+  /// The same from a rotation matrix and a translation; errors name `node`.
+  Expected<Pose> rigid(const YamlNode& node, const std::string& key, const Eigen::Matrix3d& R,
+                       const Eigen::Vector3d& p) const;
 };
 
 }  // namespace evpose

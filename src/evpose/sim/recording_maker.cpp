@@ -141,10 +141,10 @@ class Maker {
 Status Maker::write_small_files(const Trajectory& trajectory) {
   const TimeNs end = from_seconds(counts_.duration_s);
   const Pose body_cam = T_body_cam(scenario_.camera);
-  KalibrCamera camera;
+  CalibratedCamera camera;
   camera.intrinsics = intrinsics(scenario_.camera);
-  camera.has_extrinsics = true;
-  camera.T_cam_body = body_cam.inverse();
+  camera.T_cam_imu = body_cam.inverse();
+  camera.has_timeshift = true;
   camera.timeshift_cam_imu_s = scenario_.imu.time_offset_s;
   std::vector<TimedPose> body, cam;
   for (std::int64_t k = 0;; ++k) {

@@ -5,8 +5,7 @@
 #include <functional>
 #include <numbers>
 
-#include "evpose/io/trajectory_csv.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/trajectory.h"
 #include "evpose/io/waypoints.h"
 #include "evpose/sim/random.h"
 #include "evpose/sim/trajectory.h"
@@ -331,8 +330,7 @@ struct FlownSpline {
   double duration_s;
 };
 Expected<FlownSpline> spline_of_file(const TrajectoryConfig& c) {
-  const bool csv = c.file.ends_with(".csv");
-  auto rows = csv ? read_trajectory_csv(c.file) : read_tum(c.file);
+  auto rows = read_trajectory(c.file);
   if (!rows) return rows.error();
   if (rows->size() < 2) return Error{c.file, "one pose is no trajectory", "give two or more"};
   std::vector<double> t_s;

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "evpose/camera/camera.h"
+#include "evpose/core/error.h"
+#include "evpose/event/event.h"
+
+namespace evpose {
+
+/// Writes a file of events, packet by packet. Nothing stands at its path before finish().
+class EventWriter {
+ public:
+  virtual ~EventWriter() = default;
+
+  /// Stamps are rounded down to microseconds. Events must be in order, within and between packets, and inside
+  /// the size: faults of ours. Errors: writing failed, a stamp that the format cannot carry.
+  virtual Status append(const EventPacket& packet) = 0;
+  virtual Status finish() = 0;
+};
+
+/// `format`: "h5" (events.h5), "raw" (Prophesee RAW, EVT3) or "text" (`t x y p`, seconds; with the extension
+/// .csv the vendor's `x,y,p,t`, microseconds); empty: by the extension of `path`. Errors: unknown format, a
+/// size that the format cannot carry, the folder cannot be written.
+Expected<std::unique_ptr<EventWriter>> create_event_writer(const std::string& path, const std::string& format,
+                                                           ImageSize size);
+
+}  // namespace evpose

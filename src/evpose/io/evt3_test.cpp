@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/evt3.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace evpose {
+namespace {
+
+struct Row {
+  std::int64_t t_us;
+  int x, y, on;
+  bool operator==(const Row&) const = default;
+};
+
+using Words = std::vector<std::uint16_t>;
+
+Words high(unsigned v) { return {static_cast<std::uint16_t>(0x8000 | v)}; }
+Words low(unsigned v) { return {static_cast<std::uint16_t>(0x6000 | v)}; }
+Words row(unsigned y) { return {static_cast<std::uint16_t>(y)}; }
+Words event(unsigned x, unsigned on) { return {static_cast<std::uint16_t>(0x2000 | on << 11 | x)}; }
+
+Words join(std::initializer_list<Words> parts) {
+  Words all;
+  for (const Words& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+/// Feeds the bytes in pieces of a length, and empties the block in between.
+std::vector<Row> decode(Evt3Decoder& decoder, const Words& words, std::size_t piece = SIZE_MAX,
+                        std::vector<Trigger>* triggers = nullptr) {
+  const auto bytes = std::as_bytes(std::span(words));
+  std::vector<Row> rows;
+  EventBlock block;
+  std::vector<std::byte> rest;
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t count = std::min(piece, bytes.size() - at);
+    rest.insert(rest.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                bytes.begin() + static_cast<std::ptrdiff_t>(at + count));
+    at += count;
+    while (true) {
+      block.start();
+      const std::size_t used = decoder.decode(rest, block, triggers);
+      rest.erase(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(used));
+      for (std::size_t i = 0; i < block.count; ++i) {
+        const Event& e = block.events[i];
+        rows.push_back({block.time_us(i), e.x, e.y, e.on});
+      }
+      if (used == 0) break;
+    }
+  }
+  return rows;
+}
+
+std::vector<Row> decode(const Words& words, ImageSize size = {}) {
+  Evt3Decoder decoder(size);
+  return decode(decoder, words);
+}
+
+TEST(Evt3, NothingBeforeTheTimeIsKnown) {
+  const Words lost = join({row(1), event(2, 1), low(7), event(3, 1), high(5), event(4, 0)});
+  EXPECT_TRUE(decode(lost).empty());
+  EXPECT_EQ(decode(join({lost, low(9), event(5, 1)})), (std::vector<Row>{{5 * 4096 + 9, 5, 1, 1}}));
+}
+
+TEST(Evt3, VectorsGoOnWhereTheLastEnded) {
+  const Words words =
+      join({high(1), low(0), row(20), {0x3000 | 1 << 11 | 100}, {0x4801}, {0x4002}, {0x5F80}});
+  EXPECT_EQ(
+      decode(words),
+      (std::vector<Row>{{4096, 100, 20, 1}, {4096, 111, 20, 1}, {4096, 113, 20, 1}, {4096, 131, 20, 1}}));
+}
+
+TEST(Evt3, ClockOf24BitsGoesOnAfterItsEnd) {
+  const auto rows = decode(join({high(4095), low(4095), row(0), event(1, 0), high(0), low(1), event(2, 0),
+                                 high(4095), low(3), event(3, 0), high(0), low(4), event(4, 0)}));
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_EQ(rows[0].t_us, (1 << 24) - 1);
+  EXPECT_EQ(rows[1].t_us, (1 << 24) + 1);
+  EXPECT_EQ(rows[2].t_us, (1 << 24) + 1);  // a hiccup back over the end: held, no second wrap
+  EXPECT_EQ(rows[3].t_us, (1 << 24) + 4);
+}
+
+TEST(Evt3, TimeThatGoesBackIsHeldAndCounted) {
+  Evt3Decoder decoder;
+  const auto rows =
+      decode(decoder, join({high(100), low(50), row(0), event(1, 0), low(40), event(2, 0), high(98),
+                            event(3, 0), high(50), event(4, 0), high(100), low(60), event(5, 0)}));
+  ASSERT_EQ(rows.size(), 5u);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(rows[i].t_us, 100 * 4096 + 50) << i;
+  EXPECT_EQ(rows[4].t_us, 100 * 4096 + 60);
+  EXPECT_EQ(decoder.faults().time_regressions, 3);
+  EXPECT_EQ(decoder.faults().discontinuities, 1);
+  EXPECT_EQ(decoder.faults().missing_time_high, 1);
+}
+
+TEST(Evt3, EventsOutsideOfTheImageAreDroppedAndCounted) {
+  Evt3Decoder decoder({100, 50});
+  const auto rows = decode(decoder, join({high(0),
+                                          low(0),
+                                          row(50),
+                                          event(1, 0),
+                                          row(49),
+                                          event(100, 0),
+                                          event(99, 1),
+                                          {0x3000 | 98},
+                                          {0x400F}}));
+  EXPECT_EQ(rows, (std::vector<Row>{{0, 99, 49, 1}, {0, 98, 49, 0}, {0, 99, 49, 0}}));
+  EXPECT_EQ(decoder.faults().outside, 4);
+}
+
+TEST(Evt3, TriggersAndOtherWords) {
+  Evt3Decoder decoder;
+  std::vector<Trigger> triggers;
+  const auto rows = decode(decoder,
+                           join({high(2),
+                                 low(5),
+                                 {0xA601},
+                                 {0xE014, 0xF123, 0xF456, 0x7001},
+                                 {0x1000},
+                                 row(3),
+                                 event(4, 1),
+                                 {0xA600}}),
+                           SIZE_MAX, &triggers);
+  EXPECT_EQ(rows.size(), 1u);
+  ASSERT_EQ(triggers.size(), 2u);
+  EXPECT_EQ(triggers[0].t, (2 * 4096 + 5) * kNsPerUs);
+  EXPECT_TRUE(triggers[0].on);
+  EXPECT_FALSE(triggers[1].on);
+  EXPECT_EQ(triggers[0].id, 6);
+  EXPECT_EQ(decoder.faults().skipped_words, 1);
+}
+
+TEST(Evt3, AnyWordsInPiecesOfAnyLengthGiveTheSame) {
+  std::mt19937 random(3);
+  Words words = join({high(0), low(0)});
+  for (int i = 0; i < 60'000; ++i) words.push_back(static_cast<std::uint16_t>(random()));
+  Evt3Decoder whole;
+  std::vector<Trigger> triggers;
+  const auto expected = decode(whole, words, SIZE_MAX, &triggers);
+  EXPECT_GT(expected.size(), 20'000u);
+  for (std::size_t i = 1; i < expected.size(); ++i) EXPECT_LE(expected[i - 1].t_us, expected[i].t_us);
+  for (const std::size_t piece : {1001u, 4096u, 7u}) {
+    Evt3Decoder decoder;
+    std::vector<Trigger> same;
+    EXPECT_TRUE(decode(decoder, words, piece, &same) == expected) << piece;
+    EXPECT_EQ(same.size(), triggers.size());
+    EXPECT_EQ(decoder.faults().time_regressions, whole.faults().time_regressions);
+  }
+}
+
+}  // namespace
+}  // namespace evpose

@@ -35,7 +35,7 @@ void switch_lamps(const LampConfig& lamps, Scene& scene) {
   switching.flicker_depth = lamps.flicker_hz > 0 ? lamps.flicker_depth : 0;
   if (switching.constant()) return;
   for (Light& light : scene.lights) {
-    if (light.kind != LightKind::sun) light.switching = switching;
+    if (!light.daylight) light.switching = switching;
   }
 }
 

@@ -138,7 +138,7 @@ TEST(SceneFile, FaultsAreToldInOneLine) {
   says("lux: 500", "lux: nan", ":8: lux: 'nan' is not a finite number; give a number");
   says("kind: ambient", "kind: neon", ":8: kind: 'neon' is no kind of light; take lamp, sun or ambient");
   says("high: [1, 1, 2]", "high: [1, -1, 2]", ":2: free_space: low is not below high; exchange them");
-  says("sky_cd_m2", "sky", ":3: scene: 'sky' is unknown; did you mean 'sky_cd_m2'?");
+  says("sky_cd_m2", "sky_cd", ":3: scene: 'sky_cd' is unknown; did you mean 'sky_cd_m2'?");
   says("texel_m: 0.02", "texel_m: 0.02, size_m: [1, 1]", ":6: 'size_m' stands here twice; remove one");
   says("[1, 1], texel_m: 0.02", "[50, 50], texel_m: 0.001",
        ":6: texel_m: the texture would have more than 50 million texels; make it coarser or smaller");

@@ -2,6 +2,7 @@
 // How fast each format of events is read, from the file in the page cache to checked packets, on one core.
 #include <benchmark/benchmark.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -159,6 +160,35 @@ void copy(benchmark::State& state) {
   state.counters["MB/s"] = benchmark::Counter(total * sizeof(Event) * 1e-6, benchmark::Counter::kIsRate);
 }
 
+/// A file of so many gigabytes as nobody wants to hold in memory: written, then read once.
+void long_file(benchmark::State& state, double gigabytes) {
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("evpose-bench-" + std::to_string(::getpid()) + "-long.raw");
+  const std::vector<EventPacket> packets = synthetic_packets();
+  const TimeNs span = packets.back().base + kNsPerMs;
+  auto writer = create_event_writer(path, "", kSize);
+  if (!writer) std::abort();
+  EventPacket packet;
+  TimeNs shift = 0;
+  for (double written_gb = 0; written_gb < gigabytes; written_gb += 1e-9 * 2.067 * kEvents) {
+    for (const EventPacket& p : packets) {
+      packet = p;
+      packet.base += shift;
+      if (!(*writer)->append(packet)) std::abort();
+    }
+    shift += span;
+  }
+  if (!(*writer)->finish()) std::abort();
+  struct rusage before = {}, after = {};
+  ::getrusage(RUSAGE_SELF, &before);
+  read_file(state, path);
+  ::getrusage(RUSAGE_SELF, &after);
+  state.counters["GB"] = 1e-9 * static_cast<double>(std::filesystem::file_size(path));
+  state.counters["peak_MB_before"] = 1e-3 * static_cast<double>(before.ru_maxrss);
+  state.counters["peak_MB_after"] = 1e-3 * static_cast<double>(after.ru_maxrss);
+  std::filesystem::remove(path);
+}
+
 std::string shared_folder() {
   const char* variable = std::getenv("EVPOSE_SHARED");
   return std::string(variable != nullptr ? variable : "../shared") + "/data/real/formats/";
@@ -184,6 +214,11 @@ bool register_all() {
   for (const char* extension : {".raw", ".h5", ".txt", ".csv"})
     add(
         std::string("synthetic ") + extension, [=] { return written(synthetic_packets(), extension); }, true);
+  if (const char* gigabytes = std::getenv("EVPOSE_BENCH_GB"))
+    benchmark::RegisterBenchmark("decode/long EVT3",
+                                 [=](benchmark::State& state) { long_file(state, std::atof(gigabytes)); })
+        ->Iterations(1)
+        ->Unit(benchmark::kSecond);
   std::error_code none;
   for (const char* name :
        {"prophesee_evt2_gen3.raw", "prophesee_evt3_gen41.raw", "dvxplorer_events_imu.aedat4",

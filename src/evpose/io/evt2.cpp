@@ -2,6 +2,7 @@
 #include "evpose/io/evt2.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 
@@ -23,6 +24,8 @@ constexpr std::int64_t kWrapUs = std::int64_t{1} << 34;
 constexpr std::int64_t kWrapStepUs = kWrapUs - 64 - 10'000;
 /// Steps back that cameras are known to make without having lost the time.
 constexpr std::int64_t kHiccupUs = 10 * 4096;
+/// Words taken one by one where a group of them was not of the usual kind.
+constexpr std::size_t kBetweenGroups = 8;
 /// What a block may span, short of what Event holds.
 constexpr std::int64_t kBlockSpanUs = std::int64_t{1} << 31;
 constexpr std::size_t kWidestVector = 32;
@@ -66,7 +69,44 @@ void Evt2Clock::set(std::uint32_t high, DecodeFaults& faults) {
 Evt2Decoder::Evt2Decoder(ImageSize size)
     : width_(side(size.width, 1 << 16)), height_(side(size.height, 1 << 15)) {}
 
-/// Events and time words that go forward, without branches that depend on the data.
+/// Groups of events that are all sound and in order, as most are: short loops of fixed length, which
+/// compilers turn into vector instructions. Returns the number of words taken.
+std::size_t Evt2Decoder::groups(const std::byte* bytes, std::size_t words, EventBlock& block) {
+  constexpr std::size_t kGroup = 8;
+  const auto high_dt = static_cast<std::uint32_t>(clock_.high_us() - block.base_us);
+  const auto width = static_cast<std::int32_t>(width_), height = static_cast<std::int32_t>(height_);
+  // The first must not be behind the last event; 64 stands for any time that is beyond all of the group.
+  const bool is_behind = last_us_ > clock_.high_us();
+  auto low =
+      static_cast<std::int32_t>(is_behind ? std::min<std::int64_t>(last_us_ - clock_.high_us(), 64) : 0);
+  std::size_t i = 0;
+  for (; i + kGroup <= words && block.count + kGroup <= block.events.size(); i += kGroup) {
+    std::array<std::uint32_t, kGroup> word;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
+    std::memcpy(word.data(), bytes + 4 * i, sizeof(word));
+    std::array<std::int32_t, kGroup + 1> t;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
+    t[0] = low;
+    for (std::size_t k = 0; k < kGroup; ++k) t[k + 1] = static_cast<std::int32_t>(word[k] >> 22 & 0x3F);
+    std::int32_t faults = 0;  // its sign bit collects what is wrong
+    for (std::size_t k = 0; k < kGroup; ++k) {
+      const auto x = static_cast<std::int32_t>(word[k] >> 11 & 0x7FF),
+                 y = static_cast<std::int32_t>(word[k] & 0x7FF);
+      const auto other_kind = static_cast<std::int32_t>(word[k] >> 29 != 0 ? 0x80000000u : 0u);
+      faults |= (t[k + 1] - t[k]) | (width - 1 - x) | (height - 1 - y) | other_kind;
+    }
+    if (faults < 0) break;
+    Event* const out = block.events.data() + block.count;
+    for (std::size_t k = 0; k < kGroup; ++k)
+      out[k] = event_of_bits(event_bits(high_dt + static_cast<std::uint32_t>(t[k + 1]), word[k] >> 11 & 0x7FF,
+                                        word[k] & 0x7FF, word[k] >> 28));
+    block.count += kGroup;
+    low = t[kGroup];
+  }
+  if (i > 0) last_us_ = block.time_us(block.count - 1);
+  return i;
+}
+
+/// Events and time words that go forward, without branches that depend on the data. A group's worth at a
+/// time.
 std::size_t Evt2Decoder::plain(const std::byte* bytes, std::size_t words, EventBlock& block) {
   const std::int64_t wraps_us = clock_.wraps_us(), base_us = block.base_us;
   std::int64_t high = clock_.high_us(), last = last_us_, held = 0, outside = 0;
@@ -107,8 +147,12 @@ std::size_t Evt2Decoder::decode(std::span<const std::byte> bytes, EventBlock& bl
   while (i < words && has_room(block, 1, std::max(clock_.high_us(), last_us_))) {
     if (clock_.started()) {
       if (block.count == 0) block.base_us = std::max(last_us_, clock_.high_us());
-      i += plain(bytes.data() + 4 * i, words - i, block);
-      if (i == words || !has_room(block, 1, 0)) break;
+      if (clock_.high_us() >= block.base_us) i += groups(bytes.data() + 4 * i, words - i, block);
+      const std::size_t some = std::min(words - i, kBetweenGroups);
+      const std::size_t taken = plain(bytes.data() + 4 * i, some, block);
+      i += taken;
+      if (taken == some) continue;
+      if (!has_room(block, 1, 0)) break;
     }
     const auto word = load_word<std::uint32_t>(bytes.data(), i++);
     const unsigned kind = word >> 28;

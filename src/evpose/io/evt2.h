@@ -38,6 +38,7 @@ class Evt2Decoder {
   const DecodeFaults& faults() const { return faults_; }
 
  private:
+  std::size_t groups(const std::byte* bytes, std::size_t words, EventBlock& block);
   std::size_t plain(const std::byte* bytes, std::size_t words, EventBlock& block);
 
   std::uint64_t width_, height_;

@@ -98,41 +98,62 @@ bool Evt3Decoder::has_room(const EventBlock& block) const {
          (block.count == 0 || std::max(now_us_, last_us_) - block.base_us <= UINT32_MAX - kLoopUs);
 }
 
-/// Rows, single events and times that stay in the same high part: without branches that depend on the data,
-/// which is what makes it fast. Stops at any other word and where the block is full.
+/// Rows, single events and times that go on in the same high part: with next to no branch that depends on the
+/// data, which is what makes it fast. Stops at any other word, at an event outside, and where the block is
+/// full.
 std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventBlock& block) {
   constexpr unsigned kPlain = 1u << kAddressY | 1u << kAddressX | 1u << kTimeLow;
-  const unsigned same_high = kTimeHigh << 12 | high_;
-  const std::uint64_t width = width_, height = height_;
-  const std::int64_t high_us = high_us_, base_us = block.base_us;
-  std::int64_t now = now_us_, last = last_us_, held = 0, outside = 0;
-  std::uint64_t y = y_;
-  Event* out = block.events.data() + block.count;
+  const unsigned same_high = kTimeHigh << 12 | high_, width = width_, height = height_;
+  const std::int64_t high_dt = high_us_ - block.base_us;
+  std::int64_t dt = now_us_ - block.base_us;
+  unsigned y = y_;
+  Event* const begin = block.events.data() + block.count;
   Event* const full = block.events.data() + block.events.size();
+  Event* out = begin;
   std::size_t i = 0;
   for (; i < words && out < full; ++i) {
-    const unsigned word = load(bytes, i), kind = word >> 12;
+    const unsigned word = load(bytes, i), kind = word >> 12, x = word & 0x7FF;
     if ((kPlain >> kind & 1) == 0 && word != same_high) break;
-    y = kind == kAddressY ? word & 0x7FF : y;
-    now = kind == kTimeLow ? high_us + (word & 0xFFF) : now;
-    const std::uint64_t x = word & 0x7FF;
-    const std::int64_t stamp = std::max(now, last);
-    *out = event_of_bits(event_bits(static_cast<std::uint32_t>(stamp - base_us), x, y, word >> 11 & 1));
+    const std::int64_t told = high_dt + (word & 0xFFF);
+    if (static_cast<bool>(static_cast<unsigned>(kind == kTimeLow) & static_cast<unsigned>(told < dt))) break;
     const bool is_event = kind == kAddressX;
-    const bool inside =
-        static_cast<bool>(static_cast<unsigned>(x < width) & static_cast<unsigned>(y < height));
-    const bool taken = static_cast<bool>(static_cast<unsigned>(is_event) & static_cast<unsigned>(inside));
-    out += taken ? 1 : 0;
-    outside += is_event != taken ? 1 : 0;
-    held += taken ? static_cast<std::int64_t>(now < last) : 0;
-    last = taken ? stamp : last;
+    const bool outside =
+        static_cast<bool>(static_cast<unsigned>(x >= width) | static_cast<unsigned>(y >= height));
+    if (static_cast<bool>(static_cast<unsigned>(is_event) & static_cast<unsigned>(outside))) break;
+    *out = event_of_bits(event_bits(static_cast<std::uint32_t>(dt), x, y, word >> 11 & 1));
+    out += is_event ? 1 : 0;
+    y = kind == kAddressY ? x : y;
+    dt = kind == kTimeLow ? told : dt;
   }
   block.count = static_cast<std::size_t>(out - block.events.data());
-  y_ = static_cast<unsigned>(y);
-  now_us_ = now;
-  last_us_ = last;
-  faults_.time_regressions += held;
-  faults_.outside += outside;
+  y_ = y;
+  now_us_ = block.base_us + dt;
+  if (out > begin) last_us_ = block.time_us(block.count - 1);
+  return i;
+}
+
+/// The same while the camera's time is behind that of the last event. Of the words that plain() takes it
+/// takes all, and counts what it drops and what it holds back.
+std::size_t Evt3Decoder::held(const std::byte* bytes, std::size_t words, EventBlock& block) {
+  std::size_t i = 0;
+  for (; i < words && now_us_ < last_us_ && block.count < block.events.size(); ++i) {
+    const unsigned word = load(bytes, i), kind = word >> 12;
+    if (kind == kTimeLow) {
+      now_us_ = high_us_ + (word & 0xFFF);
+    } else if (kind == kAddressY) {
+      set_y(word);
+    } else if (kind == kAddressX) {
+      const unsigned x = word & 0x7FF;
+      const auto dt = static_cast<std::uint32_t>(last_us_ - block.base_us);
+      block.events[block.count] = event_of_bits(event_bits(dt, x, y_, word >> 11 & 1));
+      const bool inside = x < width_ && y_ < height_;
+      block.count += inside ? 1 : 0;
+      faults_.outside += inside ? 0 : 1;
+      faults_.time_regressions += inside ? 1 : 0;
+    } else {
+      break;
+    }
+  }
   return i;
 }
 
@@ -161,10 +182,21 @@ std::size_t Evt3Decoder::decode(std::span<const std::byte> bytes, EventBlock& bl
   while (i < words && has_room(block)) {
     // Within one high part time may still go back to its beginning, but not before the base.
     if (block.count == 0) block.base_us = std::max(last_us_, high_us_);
-    i += plain(bytes.data() + 2 * i, words - i, block);
+    if (now_us_ < last_us_) {
+      i += held(bytes.data() + 2 * i, words - i, block);
+      if (now_us_ >= last_us_) continue;
+    } else {
+      i += plain(bytes.data() + 2 * i, words - i, block);
+    }
     if (i == words || !has_room(block)) break;
     const unsigned word = load(bytes.data(), i++), value = word & 0xFFF;
     switch (word >> 12) {
+      case kAddressX:  // plain() stops only at one outside
+        ++faults_.outside;
+        break;
+      case kTimeLow:
+        now_us_ = high_us_ + value;
+        break;
       case kVectorBase:
         set_base(word);
         break;

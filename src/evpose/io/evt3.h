@@ -35,6 +35,7 @@ class Evt3Decoder {
  private:
   std::size_t begin(const std::byte* bytes, std::size_t words);
   std::size_t plain(const std::byte* bytes, std::size_t words, EventBlock& block);
+  std::size_t held(const std::byte* bytes, std::size_t words, EventBlock& block);
   void set_y(unsigned word);
   void set_base(unsigned word);
   void set_high(unsigned high);

@@ -176,6 +176,7 @@ TEST(Lidar, CloudFileIsTheSameForAnyThreadsAndReadsBack) {
   const RayCaster look(test.scene);
   const TemporaryFolder folder;
   LidarConfig c;
+  c.on = true;
   c.flight.duration_s = 1;
   c.flight.centre_x_m = 2;
   c.points_per_s = 20000;
@@ -200,14 +201,17 @@ TEST(Lidar, TooManyPointsAreRefused) {
   const TemporaryFolder folder;
   ThreadPool pool(1);
   LidarConfig c;
+  c.on = true;
   c.points_per_s = 1e7;
   c.keep_every = 1;
   EXPECT_TRUE(says(error_line(write_lidar(folder / "a.ply", look, c, 1, pool)), {"lidar", "too many"}));
   c = LidarConfig();
+  c.on = true;
   c.scan_s = 1e-4;
   EXPECT_TRUE(
       says(error_line(write_lidar(folder / "a.ply", look, c, 1, pool)), {"lidar.scan_s", "too many"}));
   c = LidarConfig();
+  c.on = true;
   c.up_deg = c.down_deg;
   EXPECT_TRUE(says(error_line(write_lidar(folder / "a.ply", look, c, 1, pool)), {"field of view"}));
   EXPECT_EQ(folder.entries(), 0u);

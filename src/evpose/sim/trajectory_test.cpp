@@ -328,7 +328,9 @@ TEST(Trajectory, BadFilesAndConfigsAreRefusedInOneLine) {
   EXPECT_TRUE(says(line(c), {"none.tum"}));
   c.file = folder.file("a.tum", "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n");
   EXPECT_TRUE(says(line(c), {"a.tum:2", "does not come after"}));
-  c.file = folder.file("b.tum", "0 0 0 0 0 0 0 1\n1e6 0 0 0 0 0 0 1\n");
+  std::string hours;
+  for (int i = 0; i <= 260; ++i) hours += text(56.0 * i, " 0 0 0 0 0 0 1\n");
+  c.file = folder.file("b.tum", hours);
   EXPECT_TRUE(says(line(c), {"b.tum", "covers"}));
   c.file = folder.file("c.tum", "0 0 0 0 0 0 0 1\n1 1e200 0 0 0 0 0 1\n");
   EXPECT_TRUE(says(line(c), {"c.tum", "position"}));

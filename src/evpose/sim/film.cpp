@@ -103,6 +103,8 @@ struct Film::Impl {
   TilePlan plan(const Work& tile, const Block& block, int& samples) const;
   void classify(const Work& tile, int reach, TilePlan& plan) const;
   void run(Work& tile, const Block& block);
+  void follow(Work& tile, const Block& block, const CourseContext& context, const Course& course,
+              std::size_t pixel);
   void step(Work& tile, const Block& block, const TilePlan& plan, const CourseContext& context,
             const TileSamples& samples);
 };
@@ -304,38 +306,46 @@ TilePlan Film::Impl::plan(const Work& tile, const Block& block, int& samples) co
   return out;
 }
 
-// From the sample before to this one: pixels, exposures.
+// Takes a pixel along its course.
+void Film::Impl::follow(Work& tile, const Block& block, const CourseContext& context, const Course& course,
+                        std::size_t pixel) {
+  const TimeNs t0 = context.t0, t1 = context.t1;
+  TimeNs from_t = t0;
+  for (int k = 1; k < course.knots; ++k) {
+    const TimeNs to_t =
+        k + 1 == course.knots ? t1 : t0 + static_cast<TimeNs>(course.time[k] * static_cast<float>(t1 - t0));
+    if (to_t <= from_t) continue;
+    pixels.advance(pixel, from_t, to_t, course.luminance[k - 1] + block.glare,
+                   course.luminance[k] + block.glare, tile.events);
+    from_t = to_t;
+  }
+  tile.counts.knots += course.knots - 2;
+  const double length_ns = static_cast<double>(t1 - t0);
+  for (Exposure* exposure : block.exposures) {
+    const TimeNs open = std::max(t0, exposure->open), close = std::min(t1, exposure->close);
+    if (open >= close) continue;
+    const float seen = course.integral(static_cast<double>(open - t0) / length_ns,
+                                       static_cast<double>(close - t0) / length_ns);
+    exposure->sum[pixel] += static_cast<float>(to_seconds(t1 - t0)) * seen +
+                            static_cast<float>(to_seconds(close - open)) * block.glare;
+  }
+}
+
+// From the sample before to this one.
 void Film::Impl::step(Work& tile, const Block& block, const TilePlan& plan, const CourseContext& context,
                       const TileSamples& samples) {
-  const double t0_s = context.from.t_s, t1_s = context.to.t_s;
-  const TimeNs t0 = context.t0, t1 = context.t1;
   for (int y = 0; y < plan.tile.height; ++y) {
     for (int x = 0; x < plan.tile.width; ++x) {
       const std::size_t in_tile = static_cast<std::size_t>(y) * kTilePx + x;
       const int column = plan.tile.x0 + x, row = plan.tile.y0 + y;
       const std::size_t i = index(column, row);
       const PixelSample& sample = samples[in_tile];
-      const Course course = pixel_course(context, last[i], sample, plan, x, y);
       const std::size_t first_event = tile.events.size();
-      TimeNs from_t = t0;
-      for (int k = 1; k < course.knots; ++k) {
-        const TimeNs to_t = k + 1 == course.knots
-                                ? t1
-                                : t0 + static_cast<TimeNs>(course.time[k] * static_cast<float>(t1 - t0));
-        if (to_t <= from_t) continue;
-        pixels.advance(i, from_t, to_t, course.luminance[k - 1] + block.glare,
-                       course.luminance[k] + block.glare, tile.events);
-        from_t = to_t;
-      }
-      tile.counts.knots += course.knots - 2;
-      for (Exposure* exposure : block.exposures) {
-        const double open = std::max(t0_s, to_seconds(exposure->open)),
-                     close = std::min(t1_s, to_seconds(exposure->close));
-        if (!(open < close)) continue;
-        const double length = t1_s - t0_s;
-        exposure->sum[i] +=
-            static_cast<float>(length) * course.integral((open - t0_s) / length, (close - t0_s) / length) +
-            static_cast<float>(close - open) * block.glare;
+      if (block.exposures.empty() && nearly_same(last[i], sample)) {
+        pixels.advance(i, context.t0, context.t1, last[i].luminance + block.glare,
+                       sample.luminance + block.glare, tile.events);
+      } else {
+        follow(tile, block, context, pixel_course(context, last[i], sample, plan, x, y), i);
       }
       const bool outline = sample.outline || last[i].outline, moving = sample.moving || last[i].moving;
       for (std::size_t e = first_event; e < tile.events.size(); ++e) {

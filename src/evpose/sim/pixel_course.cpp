@@ -9,7 +9,7 @@ namespace {
 
 // Changes of luminance, as ratios, from which more pieces are needed: event times are then good to a
 // hundredth of a pixel of motion.
-constexpr float kPlain = 1.08F, kSome = 1.12F, kMuch = 1.35F;
+constexpr float kSome = 1.12F, kMuch = 1.35F;
 // A border that does not give back the samples at the two ends is not the whole story.
 constexpr float kFit = 1.1F;
 
@@ -93,17 +93,17 @@ Course pixel_course(const CourseContext& c, const PixelSample& p, const PixelSam
   Course course;
   course.add(0, p.luminance);
   const float change = ratio(p.luminance, q.luminance);
-  if (change > kPlain) {
-    const int column = plan.tile.x0 + x, row = plan.tile.y0 + y;
-    const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
-    if (has_border(p) || has_border(q)) {
-      follow_border(c, p, q, c.sampler.ray(column, row), change > kMuch ? 8 : 4, course);
-    } else if (plan.pixel[i] == PixelClass::flat && plan.patch[i] >= 0 && change > kSome) {
-      const int step = change > kMuch ? 1 : 2;
-      for (int k = step; k < 4; k += step)
-        course.add(0.25F * static_cast<float>(k),
-                   c.sampler.flat_luminance(c.at_quarter(k), plan.patch[i], column, row));
-    }
+  const int column = plan.tile.x0 + x, row = plan.tile.y0 + y;
+  const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
+  if (nearly_same(p, q)) {
+    // nothing in between
+  } else if (has_border(p) || has_border(q)) {
+    follow_border(c, p, q, c.sampler.ray(column, row), change > kMuch ? 8 : 4, course);
+  } else if (plan.pixel[i] == PixelClass::flat && plan.patch[i] >= 0 && change > kSome) {
+    const int step = change > kMuch ? 1 : 2;
+    for (int k = step; k < 4; k += step)
+      course.add(0.25F * static_cast<float>(k),
+                 c.sampler.flat_luminance(c.at_quarter(k), plan.patch[i], column, row));
   }
   course.add(1, q.luminance);
   return course;

@@ -39,6 +39,12 @@ struct Course {
   float integral(double open, double close) const;
 };
 
+/// True where a straight line is good enough.
+inline bool nearly_same(const PixelSample& p, const PixelSample& q) {
+  constexpr float kSmall = 1.08F;
+  return p.luminance <= kSmall * q.luminance && q.luminance <= kSmall * p.luminance;
+}
+
 /// `p` and `q` are the samples of pixel (x, y) of the tile at the two ends. Small changes are taken as
 /// linear. A border that crosses the pixel is followed along its line; a texture is looked at again.
 Course pixel_course(const CourseContext& context, const PixelSample& p, const PixelSample& q,

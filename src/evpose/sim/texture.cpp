@@ -103,10 +103,12 @@ float Texture::mean(float u_m, float v_m, const Eigen::Vector2f& a_m, const Eige
     taps = std::min(kMostTaps, static_cast<int>(std::ceil(major / across)));
     across = std::max(across, major / static_cast<float>(taps));
   }
-  const float scale = std::log2(across / texel_);
-  const int fine = std::clamp(static_cast<int>(scale), 0, static_cast<int>(levels_.size()) - 1);
-  const int coarse = std::min(fine + 1, static_cast<int>(levels_.size()) - 1);
-  const float blend = std::clamp(scale - static_cast<float>(fine), 0.0f, 1.0f);
+  // Level and share of the next one: a footprint of 2^k (1 + f) texels is that share f on from level k.
+  int exponent = 0;
+  const float mantissa = 2 * std::frexp(across / texel_, &exponent);
+  const int last = static_cast<int>(levels_.size()) - 1;
+  const int fine = std::min(exponent - 1, last), coarse = std::min(fine + 1, last);
+  const float blend = fine < last ? mantissa - 1 : 0;
   // Unit vector along the major axis.
   Eigen::Vector2f axis(root + half_difference, uv);
   if (half_difference < 0) axis = {uv, root - half_difference};

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Events of two recordings side by side: compare_simulators.py [options] OUT NAME=FOLDER NAME=FOLDER
+"""Events of recordings side by side: compare_simulators.py [options] OUT NAME=FOLDER NAME=FOLDER ...
 
     --contours NAME=FILE.ply    true contours, where they are not in the folder
     --cloud NAME=FILE.ply       cloud that tells what hides contours, where it is not map_raw.ply of the folder
-    --start S, --end S          stretch of both recordings
+    --start S, --end S          stretch of each recording
 
 Prints a table in Markdown and writes OUT/events.png (events of 20 ms of each) and OUT/distributions.svg (times
 between events of a pixel, events per pixel). Needs numpy and h5py.
@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 PICTURE_S = 0.02
-COLOURS = ("#1f5fa8", "#c23b22")
+COLOURS = ("#1f5fa8", "#3a9a5b", "#c23b22", "#8a56ac")
 
 
 # ---- files
@@ -324,14 +324,14 @@ def write_distributions(path, recordings):
     out += svg_panel(30, "Time between events of a pixel", "s", between_edges, between)
     out += svg_panel(470, "Events per pixel", "1/s", count_edges, counts)
     for i, (recording, colour) in enumerate(zip(recordings, COLOURS)):
-        out.append(f'<text x="{250 + 110 * i}" y="{56}" fill="{colour}">{recording.name}</text>')
+        out.append(f'<text x="{850 - 90 * (len(recordings) - 1 - i)}" y="32" text-anchor="end" fill="{colour}">{recording.name}</text>')
     path.write_text("\n".join(out) + "\n</svg>\n")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("recordings", nargs=2, metavar="NAME=FOLDER")
+    parser.add_argument("recordings", nargs="+", metavar="NAME=FOLDER")
     parser.add_argument("--contours", action="append", default=[], metavar="NAME=FILE")
     parser.add_argument("--cloud", action="append", default=[], metavar="NAME=FILE")
     parser.add_argument("--start", type=float, default=0.0)
@@ -344,6 +344,8 @@ def main():
                 sys.exit(f"{value}: write NAME=PATH")
         return {name: pathlib.Path(path) for name, path in (value.split("=", 1) for value in values)}
 
+    if len(options.recordings) > len(COLOURS):
+        sys.exit(f"{len(COLOURS)} recordings at most")
     contours, clouds = named(options.contours), named(options.cloud)
     recordings = [Recording(name, folder, contours.get(name), clouds.get(name), options.start, options.end)
                   for name, folder in named(options.recordings).items()]

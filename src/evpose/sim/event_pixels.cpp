@@ -183,7 +183,9 @@ void EventPixels::start(std::size_t pixel, TimeNs t, float luminance_cd_m2) {
   // Anywhere between "about to fire off" and "about to fire on".
   const double share = config_.start_spread * p.random.uniform(-1, 1);
   set_reference(p, p.filtered, t);
-  p.reference += share * (share < 0 ? p.on : p.off);
+  const double offset = share * (share < 0 ? p.on : p.off);
+  p.reference += offset;
+  p.log_leak += static_cast<float>(0.5 * offset);
   set_bounds(p, t);
 }
 
@@ -216,7 +218,7 @@ bool EventPixels::accept_noise(std::size_t pixel, double level, EventCause& caus
 
 void EventPixels::set_reference(Pixel& p, double log_luminance, TimeNs t) const {
   p.reference = log_luminance + leak_per_s_ * seconds(t);
-  p.log_reset = static_cast<float>(log_luminance);
+  p.log_leak = static_cast<float>(log_luminance + 0.5 * p.on);
 }
 
 void EventPixels::set_bounds(Pixel& p, TimeNs t) const {
@@ -270,10 +272,10 @@ void EventPixels::walk(std::size_t pixel, TimeNs t0, TimeNs t1, const Signal& si
       now = t_crossing;
       const bool on = crossing->second;
       const double log_luminance = signal.log_luminance(since(now));
-      const bool leaked = on && log_luminance - p.log_reset < 0.5 * static_cast<double>(p.on);
+      const bool leaked = on && log_luminance < p.log_leak;
       fire(pixel, now, on, leaked ? EventCause::leak : EventCause::signal, events);
       p.reference += on ? p.on : -p.off;
-      p.log_reset = static_cast<float>(log_luminance);
+      p.log_leak = static_cast<float>(log_luminance + 0.5 * p.on);
     }
     if (refractory_ns_ > 0) {
       p.low = -kInfinity;

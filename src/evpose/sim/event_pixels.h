@@ -72,10 +72,11 @@ class EventPixels {
     // its end.
     float low = 0, high = 0;
     TimeNs wake = 0;
-    double filtered = 0;    ///< log luminance behind the low pass
-    double reference = 0;   ///< signal
-    float log_last = 0;     ///< log luminance in front of the low pass
-    float log_reset = 0;    ///< filtered log luminance when the reference was set
+    double filtered = 0;   ///< log luminance behind the low pass
+    double reference = 0;  ///< signal
+    float log_last = 0;    ///< log luminance in front of the low pass
+    float log_leak =
+        0;  ///< filtered log luminance below which an on event is more the leak's than the signal's
     float on = 0, off = 0;  ///< thresholds
     TimeNs next_noise = 0;
     Random random;

@@ -266,6 +266,7 @@ TEST(EventPixels, FirstReferencesLieAnywhereBetweenTheThresholds) {
     const auto events =
         watch(pixels, i, even_grid(kNsPerMs, 60 * kNsPerMs), [](double t) { return 20 * std::exp(10 * t); });
     ASSERT_FALSE(events.empty());
+    for (const SimEvent& e : events) EXPECT_EQ(e.cause, EventCause::signal);
     const double left = 10 * to_seconds(events[0].t);  // of the way to the first event: even in 0 .. 0.48
     sum += left;
     squares += left * left;

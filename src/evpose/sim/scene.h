@@ -61,7 +61,7 @@ struct Light {
   double strength = 0;
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< sun: the way its light goes, map frame
   Eigen::Vector3d position = Eigen::Vector3d::Zero();     ///< lamp: metres, map frame
-  double radius = 0.1;  ///< lamp: metres; sun: rad, half its apparent size. Width of half shadows
+  double radius = 0.1;    ///< lamp: metres; sun: rad, half its apparent size. Width of half shadows
   bool daylight = false;  ///< from out of doors: is not switched with the lamps
   LightSwitching switching;
 };

@@ -98,10 +98,10 @@ Status write_depth(const NewFolder& folder, const Stage& stage, const std::vecto
   for (int k = 0; from_seconds(k / config.rate_hz) <= end; ++k) {
     const TimeNs t = from_seconds(k / config.rate_hz);
     const Pose pose = T_map_cam(to_seconds(t));
+    const std::vector<Pose> parts = stage.rays.parts_at(to_seconds(t));
     pool.for_chunks(rays.size(), 4096, [&](std::size_t, std::size_t begin, std::size_t stop) {
       for (std::size_t i = begin; i < stop; ++i) {
-        const auto hit =
-            stage.rays.trace_at(to_seconds(t), pose.p, pose.q * rays[i].direction().cast<double>());
+        const auto hit = stage.rays.trace(parts, pose.p, pose.q * rays[i].direction().cast<double>());
         const double mm = hit ? 1e3 * hit->distance : 0;  // rays have z = 1
         depth_mm[i] = mm < 65535 ? static_cast<std::uint16_t>(std::lround(mm)) : std::uint16_t{0};
       }

@@ -251,8 +251,9 @@ void bake_lights(const RayCaster& rays, const LightChannels& channels, PartSurfa
       const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows;
       map.values.resize(texels * light.size());
       for (std::size_t i = 0; i < texels; ++i) {
-        const Eigen::Vector2d at(map.right0 + static_cast<double>(i % map.columns) / map.per_metre,
-                                 map.up0 + static_cast<double>(i / map.columns) / map.per_metre);
+        const std::size_t column = i % map.columns, row = i / map.columns;
+        const Eigen::Vector2d at(map.right0 + static_cast<double>(column) / map.per_metre,
+                                 map.up0 + static_cast<double>(row) / map.per_metre);
         const Place place = nearest_place(flat, at);
         const Eigen::Vector3d point =
             place.at.x() * map.right + place.at.y() * map.up - patch.offset * patch.normal;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <vector>
 
 #include "evpose/core/error.h"
@@ -27,12 +26,13 @@ ScenePointer make_scene(RTCDevice device, const Mesh& mesh) {
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
   if (!mesh.triangles.empty()) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                             sizeof(Eigen::Vector3f), mesh.vertices.size());
-    std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * sizeof(Eigen::Vector3f));
-    void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              sizeof(Mesh::Corners), mesh.triangles.size());
-    std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(Mesh::Corners));
+    auto* vertices = static_cast<Eigen::Vector3f*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                sizeof(Eigen::Vector3f), mesh.vertices.size()));
+    std::copy(mesh.vertices.begin(), mesh.vertices.end(), vertices);
+    auto* triangles = static_cast<Mesh::Corners*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Mesh::Corners), mesh.triangles.size()));
+    std::copy(mesh.triangles.begin(), mesh.triangles.end(), triangles);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene.get(), geometry);
     rtcReleaseGeometry(geometry);
@@ -72,7 +72,7 @@ std::optional<RayHit> nearest(RTCScene scene, int part, const Eigen::Vector3d& o
 
 struct RayCaster::Impl {
   struct ReleaseDevice {
-    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCDevice one) const { rtcReleaseDevice(one); }
   };
   std::unique_ptr<RTCDeviceTy, ReleaseDevice> device;
   ScenePointer still;
@@ -100,11 +100,17 @@ std::optional<RayHit> RayCaster::trace_part(int part, const Eigen::Vector3d& ori
   return nearest(impl_->moving[part].get(), part, origin, direction, near, far);
 }
 
-std::optional<RayHit> RayCaster::trace_at(double t_s, const Eigen::Vector3d& origin,
-                                          const Eigen::Vector3d& direction, float near, float far) const {
+std::vector<Pose> RayCaster::parts_at(double t_s) const {
+  std::vector<Pose> poses;
+  for (const MovingPart& part : scene_.moving) poses.push_back(part.T_map_part(t_s));
+  return poses;
+}
+
+std::optional<RayHit> RayCaster::trace(const std::vector<Pose>& T_map_part, const Eigen::Vector3d& origin,
+                                       const Eigen::Vector3d& direction, float near, float far) const {
   std::optional<RayHit> hit = trace(origin, direction, near, far);
-  for (std::size_t i = 0; i < scene_.moving.size(); ++i) {
-    const Pose T_part_map = scene_.moving[i].T_map_part(t_s).inverse();
+  for (std::size_t i = 0; i < T_map_part.size(); ++i) {
+    const Pose T_part_map = T_map_part[i].inverse();
     const auto closer = trace_part(static_cast<int>(i), T_part_map * origin, T_part_map.q * direction, near,
                                    hit ? hit->distance : far);
     if (closer) hit = closer;

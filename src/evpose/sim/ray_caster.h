@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "evpose/core/pose.h"
 #include "evpose/sim/scene.h"
@@ -39,9 +40,12 @@ class RayCaster {
   };
   void trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
                    std::span<BatchHit> hits) const;
-  /// Moving parts too, as they stand at `t_s`.
-  std::optional<RayHit> trace_at(double t_s, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                 float near = 0, float far = std::numeric_limits<float>::infinity()) const;
+  /// Where the moving parts stand at a time: T_map_part of each.
+  std::vector<Pose> parts_at(double t_s) const;
+  /// Moving parts too, as they stand.
+  std::optional<RayHit> trace(const std::vector<Pose>& T_map_part, const Eigen::Vector3d& origin,
+                              const Eigen::Vector3d& direction, float near = 0,
+                              float far = std::numeric_limits<float>::infinity()) const;
   /// One part alone, in its own frame.
   std::optional<RayHit> trace_part(int part, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                    float near, float far) const;

@@ -3,11 +3,10 @@
 
 namespace evpose::sim {
 
-Stage::Stage(const Scene& world, ThreadPool& pool)
-    : scene(world), rays(world), channels(light_channels(world)) {
+Stage::Stage(const Scene& of, ThreadPool& pool) : scene(of), rays(of), channels(light_channels(of)) {
   std::int32_t first = 0;
-  still = order_surfaces(world.mesh, first);
-  for (const MovingPart& part : world.moving) moving.push_back(order_surfaces(part.mesh, first));
+  still = order_surfaces(of.mesh, first);
+  for (const MovingPart& part : of.moving) moving.push_back(order_surfaces(part.mesh, first));
   bake_lights(rays, channels, still, pool);
 }
 

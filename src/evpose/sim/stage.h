@@ -12,7 +12,7 @@ namespace evpose::sim {
 /// A scene made ready to be looked at: rays, patches, baked light.
 struct Stage {
   /// Keeps a reference to the scene.
-  Stage(const Scene& scene, ThreadPool& pool);
+  Stage(const Scene& of, ThreadPool& pool);
 
   const PartSurfaces& surfaces_of(int part) const { return part < 0 ? still : moving[part]; }
   const Mesh& mesh_of(int part) const { return part < 0 ? scene.mesh : scene.moving[part].mesh; }

@@ -102,18 +102,29 @@ bool Evt3Decoder::has_room(const EventBlock& block) const {
 /// data, which is what makes it fast. Stops at any other word, at an event outside, and where the block is
 /// full.
 std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventBlock& block) {
-  constexpr unsigned kPlain = 1u << kAddressY | 1u << kAddressX | 1u << kTimeLow;
+  constexpr unsigned kVectors = 1u << kVector12 | 1u << kVector8;
+  constexpr unsigned kPlain =
+      1u << kAddressY | 1u << kAddressX | 1u << kTimeLow | 1u << kVectorBase | kVectors;
   const unsigned same_high = kTimeHigh << 12 | high_, width = width_, height = height_;
   const std::int64_t high_dt = high_us_ - block.base_us;
   std::int64_t dt = now_us_ - block.base_us;
-  unsigned y = y_;
+  unsigned y = y_, base_x = base_x_, base_on = base_on_;
   Event* const begin = block.events.data() + block.count;
-  Event* const full = block.events.data() + block.events.size();
+  Event* const full = block.events.data() + (block.events.size() - kWidestVector);
   Event* out = begin;
   std::size_t i = 0;
-  for (; i < words && out < full; ++i) {
+  for (; i < words && out <= full; ++i) {
     const unsigned word = load(bytes, i), kind = word >> 12, x = word & 0x7FF;
     if ((kPlain >> kind & 1) == 0 && word != same_high) break;
+    if ((kVectors >> kind & 1) != 0) {
+      unsigned mask = kind == kVector12 ? word & 0xFFF : word & 0xFF;
+      if (base_x + std::bit_width(mask) > width || y >= height) break;
+      const std::uint64_t first = event_bits(static_cast<std::uint32_t>(dt), base_x, y, base_on);
+      for (; mask != 0; mask &= mask - 1)
+        *out++ = event_of_bits(first + (static_cast<std::uint64_t>(std::countr_zero(mask)) << 32));
+      base_x = (base_x + (kind == kVector12 ? 12 : 8)) & 0xFFFF;
+      continue;
+    }
     const std::int64_t told = high_dt + (word & 0xFFF);
     if (static_cast<bool>(static_cast<unsigned>(kind == kTimeLow) & static_cast<unsigned>(told < dt))) break;
     const bool is_event = kind == kAddressX;
@@ -123,10 +134,12 @@ std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventB
     *out = event_of_bits(event_bits(static_cast<std::uint32_t>(dt), x, y, word >> 11 & 1));
     out += is_event ? 1 : 0;
     y = kind == kAddressY ? x : y;
+    base_x = kind == kVectorBase ? x : base_x;
+    base_on = kind == kVectorBase ? word >> 11 & 1 : base_on;
     dt = kind == kTimeLow ? told : dt;
   }
   block.count = static_cast<std::size_t>(out - block.events.data());
-  y_ = y;
+  y_ = y, base_x_ = base_x, base_on_ = base_on;
   now_us_ = block.base_us + dt;
   if (out > begin) last_us_ = block.time_us(block.count - 1);
   return i;

@@ -100,6 +100,17 @@ void AtomicFile::write(std::string_view bytes) {
     error_ = errno != 0 ? errno : EIO;
 }
 
+void AtomicFile::overwrite(std::int64_t at, std::string_view bytes) {
+  const auto seek = [&](std::int64_t to, int from) {
+    errno = 0;
+    if (error_ == 0 && ::fseeko(stream_.get(), to, from) != 0) error_ = errno != 0 ? errno : EIO;
+  };
+  EVPOSE_CHECK(stream_ != nullptr);
+  seek(at, SEEK_SET);
+  write(bytes);
+  seek(0, SEEK_END);
+}
+
 Status AtomicFile::commit() {
   EVPOSE_CHECK(stream_ != nullptr);
   errno = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -38,6 +39,8 @@ class AtomicFile {
   static Expected<AtomicFile> create(const std::string& path);
 
   void write(std::string_view bytes);
+  /// Replaces what was written at byte `at`; writing goes on at the end.
+  void overwrite(std::int64_t at, std::string_view bytes);
   Status commit();
 
  private:

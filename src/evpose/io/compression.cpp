@@ -113,6 +113,7 @@ Expected<std::size_t> run(Decoder decoder, std::span<const std::byte> data, std:
 std::vector<std::byte> compress_lz4(std::span<const std::byte> data) {
   LZ4F_preferences_t preferences = LZ4F_INIT_PREFERENCES;
   preferences.frameInfo.blockSizeID = LZ4F_max4MB;
+  preferences.frameInfo.blockMode = LZ4F_blockIndependent;  // ROS 1 knows no other
   preferences.frameInfo.contentChecksumFlag = LZ4F_contentChecksumEnabled;
   std::vector<std::byte> out(LZ4F_compressFrameBound(data.size(), &preferences));
   const std::size_t size = LZ4F_compressFrame(out.data(), out.size(), data.data(), data.size(), &preferences);

@@ -8,6 +8,8 @@ import pathlib
 import struct
 import sys
 
+import bag_seeds
+
 
 def raw(header, words, form):
     return header.encode() + b"".join(struct.pack(form, w) for w in words)
@@ -185,7 +187,7 @@ SEEDS = {
 def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
-    for target, makers in SEEDS.items():
+    for target, makers in (SEEDS | bag_seeds.SEEDS).items():
         folder = pathlib.Path(sys.argv[1]) / target
         folder.mkdir(parents=True, exist_ok=True)
         for number, make in enumerate(makers):

@@ -56,7 +56,7 @@ Error not_such(const std::string& where, const BagTopic& topic) {
 
 ImageSize read_size(MessageReader& reader) {
   const std::uint32_t height = reader.u32(), width = reader.u32();
-  if (height > 32768 || width > 65536) return {};
+  if (height == 0 || width == 0 || height > 32768 || width > 65536) return {};  // not known
   return {static_cast<int>(width), static_cast<int>(height)};
 }
 

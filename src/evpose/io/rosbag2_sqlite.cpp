@@ -11,10 +11,13 @@
 namespace evpose {
 namespace {
 
-/// Steps of SQLite's machine until a row must have come: a sound file needs a handful, to count all messages
-/// a few for each. In units of kStepsBetween.
-constexpr int kMostRounds = 1000;
-constexpr int kStepsBetween = 1'000'000;
+/// Work on one row, in rounds of as many steps of SQLite's machine. A sound file needs a handful of steps,
+/// and to count all its messages a few for each; none is shorter than 20 bytes.
+constexpr int kStepsOfRound = 1'000'000;
+struct Effort {
+  std::int64_t rounds = 0, most = 0;
+};
+std::int64_t most_rounds(std::int64_t file_bytes) { return 2 + 4 * file_bytes / kStepsOfRound; }
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
@@ -81,7 +84,7 @@ class SqliteReader : public BagReader {
   std::string selected_;  ///< ids, joined by commas
   std::int64_t last_t_ = 0, last_id_ = 0;
   bool has_last_ = false, ended_ = false;
-  int rounds_ = 0;  ///< of steps since the last row
+  Effort effort_;
   std::vector<std::byte> room_;
 };
 
@@ -102,8 +105,11 @@ Status SqliteReader::open_database() {
   sqlite3_db_config(raw, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(raw, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   // Tables that lead in circles would keep SQLite busy for ever.
-  const auto too_long = [](void* rounds) { return ++*static_cast<int*>(rounds) > kMostRounds ? 1 : 0; };
-  sqlite3_progress_handler(raw, kStepsBetween, too_long, &rounds_);
+  const auto too_long = [](void* context) {
+    auto& effort = *static_cast<Effort*>(context);
+    return ++effort.rounds > effort.most ? 1 : 0;
+  };
+  sqlite3_progress_handler(raw, kStepsOfRound, too_long, &effort_);
   return {};
 }
 
@@ -116,7 +122,7 @@ Expected<Statement> SqliteReader::prepare(const std::string& sql) const {
 
 /// True if there is a row.
 Expected<bool> SqliteReader::step(sqlite3_stmt* statement) {
-  rounds_ = 0;
+  effort_.rounds = 0;
   const int result = sqlite3_step(statement);
   if (result == SQLITE_ROW) return true;
   if (result == SQLITE_DONE) return false;
@@ -160,7 +166,9 @@ Status SqliteReader::read_topics() {
 }
 
 Status SqliteReader::open() {
-  if (const auto file = open_to_read(path_); !file) return file.error();
+  const auto file = open_to_read(path_);
+  if (!file) return file.error();
+  effort_.most = most_rounds(file->size);
   if (auto status = open_database(); !status) return status;
   if (auto status = check_tables(); !status) return status;
   if (auto status = read_topics(); !status) return status;

@@ -130,8 +130,8 @@ TEST(Rosbag2, WithoutMetadataNumbersGiveTheOrder) {
 
 TEST(Rosbag2, MessagesCompressedOneByOne) {
   const TemporaryFolder folder;
-  write_mcap(folder / "part", 0, 3);  // by its content, whatever its name
-  std::filesystem::rename(folder / "part", folder / "part.other");
+  write_mcap(folder / "part.mcap", 0, 3);
+  std::filesystem::rename(folder / "part.mcap", folder / "part.other");
   write_db3(folder / "a.db3", folder / "part.other", true, true);
   folder.file("metadata.yaml",
               metadata("    - a.db3\n", "  compression_format: zstd\n  compression_mode: MESSAGE\n"));

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "evpose/core/error.h"
+#include "evpose/map/contour_map.h"
 
 namespace CLI {
 class App;
@@ -21,6 +22,16 @@ void add_simulate(CLI::App& app, std::function<int()>& run);
 void add_track(CLI::App& app, std::function<int()>& run);
 void add_eval(CLI::App& app, std::function<int()>& run);
 void add_map(CLI::App& app, std::function<int()>& run);
+void add_convert(CLI::App& app, std::function<int()>& run);
+void add_info(CLI::App& app, std::function<int()>& run);
+
+/// A map as a whole; of one with points.
+struct MapFigures {
+  std::size_t contours = 0;
+  double length_m = 0;
+  Eigen::Vector3d low = Eigen::Vector3d::Zero(), high = Eigen::Vector3d::Zero();  ///< bounds, map frame
+};
+MapFigures figures_of(const ContourMap& map);
 
 /// Says what is wrong in one line on stderr; the exit status for it.
 inline int bad_input(const Error& error) {

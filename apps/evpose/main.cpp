@@ -28,6 +28,8 @@ int run_program(int argc, char** argv) {
   add_track(app, run);
   add_eval(app, run);
   add_map(app, run);
+  add_info(app, run);
+  add_convert(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

@@ -28,25 +28,32 @@ int import_map(const std::string& contours, const std::string& occluders, const 
 int print_map(const std::string& path) {
   const auto map = read_contour_map(path);
   if (!map) return bad_input(map.error());
-  Eigen::Vector3f low = map->points.front().position, high = low;
-  std::set<std::int32_t> contours;
-  double length_m = 0;
-  for (const auto& p : map->points) {
-    low = low.cwiseMin(p.position), high = high.cwiseMax(p.position);
-    length_m += static_cast<double>(p.length);
-    if (p.contour >= 0) contours.insert(p.contour);
-  }
-  const Eigen::Vector3d a = map->anchor + low.cast<double>(), b = map->anchor + high.cast<double>();
-  std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map->points.size(), contours.size(),
-              length_m);
-  std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", a.x(), b.x(), a.y(), b.y(),
-              a.z(), b.z());
+  const MapFigures f = figures_of(*map);
+  std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map->points.size(), f.contours,
+              f.length_m);
+  std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", f.low.x(), f.high.x(),
+              f.low.y(), f.high.y(), f.low.z(), f.high.z());
   std::printf("occluders  %zu triangles\nframe      %s\n", map->occluders.triangles.size(),
               map->frame.c_str());
   return 0;
 }
 
 }  // namespace
+
+MapFigures figures_of(const ContourMap& map) {
+  MapFigures out;
+  Eigen::Vector3f low = map.points.front().position, high = low;
+  std::set<std::int32_t> contours;
+  for (const auto& p : map.points) {
+    low = low.cwiseMin(p.position), high = high.cwiseMax(p.position);
+    out.length_m += static_cast<double>(p.length);
+    if (p.contour >= 0) contours.insert(p.contour);
+  }
+  out.contours = contours.size();
+  out.low = map.anchor + low.cast<double>();
+  out.high = map.anchor + high.cast<double>();
+  return out;
+}
 
 void add_map(CLI::App& app, std::function<int()>& run) {
   auto* map = app.add_subcommand("map", "Make and look at map files");

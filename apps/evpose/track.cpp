@@ -31,8 +31,12 @@ void add_track(CLI::App& app, std::function<int()>& run) {
   auto request = std::make_shared<TrackRequest>();
   auto dump = std::make_shared<bool>(false);
   auto* recording =
-      command->add_option("recording", request->recording, "folder with events, IMU and calibration");
+      command->add_option("recording", request->recording,
+                          "folder with events, IMU and calibration, a data set as downloaded, or a bag");
   command->add_option("--map", request->map, "contours (PLY, PCD, map.h5); default: the recording's own");
+  command->add_option(
+      "--calibration", request->calibration,
+      "calibration of any kind that evpose info knows; default: the one found with the recording");
   command->add_option("--occluders", request->occluders,
                       "PLY mesh that hides contours behind it; default: the map's own");
   command->add_option("--init", request->init,

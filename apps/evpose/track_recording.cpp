@@ -152,7 +152,7 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
 Expected<RunOutcome> track_recording(const TrackRequest& request) {
   auto config = load_config(request);
   if (!config) return config.error();
-  const auto recording = open_recording(request.recording);
+  const auto recording = open_recording(request.recording, request.calibration);
   if (!recording) return recording.error();
   auto map = load_map(request, *recording);
   if (!map) return map.error();

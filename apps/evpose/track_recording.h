@@ -20,7 +20,8 @@ struct RunConfig {
 void describe(ConfigTable& table, RunConfig& config);
 
 struct TrackRequest {
-  std::string recording;                 ///< folder
+  std::string recording;                 ///< folder or file
+  std::string calibration;               ///< file; empty: the one found with the recording
   std::string map;                       ///< file; empty: the recording's own
   std::string occluders;                 ///< mesh file; empty: those of the map, if any
   std::string init = "auto";             ///< see start.h

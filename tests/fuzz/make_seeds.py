@@ -167,7 +167,41 @@ def lz4_chunk():
     return b"\x02" + struct.pack(">QII", 512, 512, 512) + bytes(range(256)) * 2
 
 
+T = "[0,-1,0,0, 0,0,-1,0.02, 1,0,0,-0.1, 0,0,0,1]"
+
+
+def opencv(name, rows, cols, data):
+    return f"{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: {data}\n"
+
+
+CALIBRATIONS = [
+    f"cam0:\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [0.1, 0.02, 0, 0]\n"
+    f"  intrinsics: [100, 101, 50, 40]\n  resolution: [102, 82]\n  T_cam_imu: {T}\n  timeshift_cam_imu: 0.001\n"
+    f"cam1:\n  camera_model: ds\n  distortion_model: none\n  intrinsics: [-0.2, 0.5, 100, 101, 50, 40]\n"
+    f"  resolution: [102, 82]\n  T_cn_cnm1: {T}\n",
+    "accelerometer_noise_density: 1\naccelerometer_random_walk: 1\ngyroscope_noise_density: 1\n"
+    "gyroscope_random_walk: 1\nupdate_rate: 200\n",
+    '{"value0": {"T_imu_cam": [{"px": 0.1, "py": 0, "pz": 0, "qx": -0.5, "qy": 0.5, "qz": -0.5, "qw": 0.5}], '
+    '"intrinsics": [{"camera_type": "kb4", "intrinsics": {"fx": 100, "fy": 101, "cx": 50, "cy": 40, "k1": 0, '
+    '"k2": 0, "k3": 0, "k4": 0}}], "resolution": [[102, 82]], "cam_time_offset_ns": 3}}',
+    "image_width: 102\nimage_height: 82\ncamera_name: a\n"
+    "camera_matrix: {rows: 3, cols: 3, data: [100, 0, 50, 0, 101, 40, 0, 0, 1]}\ndistortion_model: plumb_bob\n"
+    "distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0.02, 0, 0, 0]}\n"
+    "T_b_c: {rows: 3, cols: 4, data: [0,0,1,0, -1,0,0,0, 0,-1,0,0]}\n",
+    "%YAML:1.0\n" + opencv("body_T_cam0", 4, 4, T) + opencv("extrinsicRotation", 3, 3, "[1,0,0,0,1,0,0,0,1]") +
+    opencv("extrinsicTranslation", 3, 1, "[0,0,0]") + "td: 0.1\n",
+    "%YAML:1.0\n---\n" + opencv("K", 3, 3, "[100,0,50,0,101,40,0,0,1]") + opencv("distortion", 4, 1, "[0,0,0,0]") +
+    "height: 82\nwidth: 102\n",
+    f"intrinsics:\n  cam0: {{camera_model: pinhole, distortion_model: none, camera_matrix: [1, 1, 1, 1], "
+    f"resolution: [2, 2], camera_type: event}}\nextrinsics: {{T_10: {T}}}\n",
+    "cameras:\n- camera: {label: dvs, image_height: 82, image_width: 102, type: pinhole, intrinsics: "
+    f"{{data: [100, 101, 50, 40]}}}}\n  T_B_C: {{data: {T}}}\n",
+    f"cam0: {{T_cam_body: {T}}}\ncam2: {{T_cam0_cam2: {T}}}\n",
+    "199.09 198.82 132.19 110.71 -0.3684 0.1509 -0.0002961 -0.000759 0.0\n",
+]
+
 SEEDS = {
+    "calibrations": [lambda text=text: text.encode() for text in CALIBRATIONS],
     "events_raw": [evt2, lambda: evt21("legacy"), lambda: evt21("little"), evt3],
     "events_dat": [lambda: dat(1), lambda: dat(2), lambda: dat(2, 0x0E)],
     "events_aedat4": [aedat4],

@@ -41,6 +41,7 @@ Reader reader_for(const YamlNode& root) {
   if (has(root, "K") && has(root, "distortion")) return read_canny_evt;
   if (any_key(root, "Camera.fx") || any_key(root, "Camera1.fx")) return read_orb_slam;
   if (any_key(root, "extrinsicRotation") || any_key(root, "body_T_cam")) return read_vins;
+  if (has(root, "raw") && has(*root.find("raw"), "intrinsics")) return read_raw_camera;
   if (has(root, "T_BS") || has(root, "sensor_type")) return read_euroc_sensor;
   if (const YamlNode* camera = numbered(root, "cam")) {
     if (has(*camera, "intrinsics")) return read_kalibr_chain;

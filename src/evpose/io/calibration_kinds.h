@@ -20,6 +20,8 @@ Expected<CalibrationFile> read_orb_slam(const YamlDocument& document);
 Expected<CalibrationFile> read_dsec(const YamlDocument& document);
 Expected<CalibrationFile> read_vector_extrinsics(const YamlDocument& document);
 Expected<CalibrationFile> read_euroc_sensor(const YamlDocument& document);
+Expected<CalibrationFile> read_raw_camera(
+    const YamlDocument& document);                                       ///< raw: {model, ...}, width, height
 Expected<CalibrationFile> read_calib_txt(const YamlDocument& document);  ///< fx fy cx cy k1 k2 p1 p2 [k3]
 
 // What they share.

@@ -196,4 +196,32 @@ Expected<CalibrationFile> read_euroc_sensor(const YamlDocument& document) {
   return out;
 }
 
+Expected<CalibrationFile> read_raw_camera(const YamlDocument& document) {
+  const YamlNode& raw = *document.root.find("raw");
+  CalibrationFile out;
+  out.kind = "raw and rectified camera";
+  CalibratedCamera camera;
+  camera.name = "cam0";
+  const auto f = required_numbers(document, raw, "intrinsics", 4);
+  if (!f) return f.error();
+  camera.numbers_line = raw.find("intrinsics")->line;
+  CameraIntrinsics c;
+  c.fx = (*f)[0], c.fy = (*f)[1], c.cx = (*f)[2], c.cy = (*f)[3];
+  const auto model = required(document, raw, "model");
+  if (!model) return model.error();
+  camera.model_line = (*model)->line;
+  const auto D = required_numbers(document, raw, "distortion");
+  if (!D) return D.error();
+  if (auto status =
+          set_distortion(document, *raw.find("distortion"), distortion_name((*model)->scalar), *D, c);
+      !status)
+    return status.error();
+  const auto size = image_size_of(document, document.root, "width", "height");
+  if (!size) return size.error();
+  c.size = *size;
+  camera.intrinsics = std::move(c);
+  out.cameras.push_back(std::move(camera));
+  return out;
+}
+
 }  // namespace evpose

@@ -46,9 +46,13 @@ std::string format_number(double value) {
 }  // namespace
 
 struct ImuReader::Impl {
-  Impl(LineReader reader, ImuReadOptions how) : lines(std::move(reader)), options(std::move(how)) {}
+  Impl(std::optional<LineReader> reader, ImuReadOptions how)
+      : lines_of_file(std::move(reader)), options(std::move(how)) {}
 
-  LineReader lines;
+  std::optional<LineReader> lines_of_file;  ///< unset: samples
+  std::string path;
+  std::shared_ptr<const std::vector<ImuSample>> samples;
+  std::size_t next_sample = 0;
   ImuReadOptions options;
   std::array<std::size_t, 7> places{};
   std::size_t columns = 7;
@@ -59,6 +63,14 @@ struct ImuReader::Impl {
   double longest_gap_s = 0;
   std::int64_t longest_gap_line = 0;
 
+  LineReader& lines() { return *lines_of_file; }
+  std::int64_t number() const {
+    return lines_of_file ? lines_of_file->number() : static_cast<std::int64_t>(next_sample) - 1;
+  }
+  std::string where() const {
+    return lines_of_file ? lines_of_file->where() : text(path, ": IMU sample ", number(), " (from 0)");
+  }
+  Expected<bool> read_one(ImuSample& sample);
   Status read_header();
   Expected<bool> read_row(ImuSample& sample);
   Status parse(std::string_view line, ImuSample& sample);
@@ -67,11 +79,11 @@ struct ImuReader::Impl {
 
 Status ImuReader::Impl::read_header() {
   std::string_view line;
-  const auto more = lines.next(line);
+  const auto more = lines().next(line);
   if (!more) return more.error();
-  if (!*more) return Error{lines.where(), "the file is empty", "store the IMU's samples, or remove it"};
+  if (!*more) return Error{where(), "the file is empty", "store the IMU's samples, or remove it"};
   if (options.columns.empty() && line != kHeader && !line.starts_with(kEurocHeader))
-    return Error{lines.where(), "the first line is not '" + kHeader + "'",
+    return Error{where(), "the first line is not '" + kHeader + "'",
                  "write that line, or name the columns by imu.columns in recording.yaml"};
   return {};
 }
@@ -79,17 +91,17 @@ Status ImuReader::Impl::read_header() {
 Status ImuReader::Impl::parse(std::string_view line, ImuSample& sample) {
   split_fields(line, fields);
   if (fields.size() != columns)
-    return Error{lines.where(), text(fields.size(), " values instead of ", columns),
+    return Error{where(), text(fields.size(), " values instead of ", columns),
                  "is the line cut off, or does imu.columns fit?"};
   const int decimals = options.time_unit == "s" ? 9 : options.time_unit == "us" ? 3 : 0;
   if (!parse_decimal(fields[places[0]], decimals, sample.t))
-    return Error{lines.where(), text("'", fields[places[0]], "' is not a stamp in ", options.time_unit),
+    return Error{where(), text("'", fields[places[0]], "' is not a stamp in ", options.time_unit),
                  "correct the line, or set imu.time_unit"};
   std::array<double, 6> values{};
   for (std::size_t k = 0; k < 6; ++k) {
     const std::string_view field = fields[places[k + 1]];
     if (!parse_number(field, values[k]) || !std::isfinite(values[k]) || std::abs(values[k]) > 1e9)
-      return Error{lines.where(), text(kColumns[k + 1], " = '", field, "' is not a finite number"),
+      return Error{where(), text(kColumns[k + 1], " = '", field, "' is not a finite number"),
                    "correct or remove the sample"};
   }
   const double gyro_scale = options.gyro_in_degrees ? std::numbers::pi / 180 : 1;
@@ -101,33 +113,46 @@ Status ImuReader::Impl::parse(std::string_view line, ImuSample& sample) {
 
 Status ImuReader::Impl::check_time(TimeNs t) {
   if (t > kLargestTimeNs || t < -kLargestTimeNs)
-    return Error{lines.where(), text("the stamp ", t, " ns is out of range"), "set imu.time_unit"};
+    return Error{where(), text("the stamp ", t, " ns is out of range"), "set imu.time_unit"};
   if (first) return {};
   if (t <= last)
-    return Error{lines.where(),
+    return Error{where(),
                  t == last ? text("the stamp ", t, " ns stands twice")
                            : text("the stamp ", t, " ns goes back behind ", last, " ns"),
                  "sort the file and remove repeated samples"};
   const double gap_s = to_seconds(t - last);
   if (gap_s > options.max_gap_s)
-    return Error{lines.where(),
+    return Error{where(),
                  text("a gap of ", gap_s, " s before this sample, more than ", options.max_gap_s, " s"),
                  "crop the recording by time.t_start_s and time.t_end_s, or remove the IMU file"};
   if (gap_s > options.warn_gap_s) {
     ++gaps;
-    if (gap_s > longest_gap_s) longest_gap_s = gap_s, longest_gap_line = lines.number();
+    if (gap_s > longest_gap_s) longest_gap_s = gap_s, longest_gap_line = number();
   }
   return {};
 }
 
-Expected<bool> ImuReader::Impl::read_row(ImuSample& sample) {
+Expected<bool> ImuReader::Impl::read_one(ImuSample& sample) {
+  if (!lines_of_file) {
+    if (next_sample == samples->size()) return false;
+    sample = (*samples)[next_sample++];
+    return true;
+  }
   std::string_view line;
   while (true) {
-    const auto more = lines.next(line);
+    const auto more = lines().next(line);
     if (!more) return more.error();
     if (!*more) return false;
     if (trimmed(line).empty() || line.front() == '#') continue;
     if (auto status = parse(line, sample); !status) return status.error();
+    return true;
+  }
+}
+
+Expected<bool> ImuReader::Impl::read_row(ImuSample& sample) {
+  while (true) {
+    const auto more = read_one(sample);
+    if (!more || !*more) return more;
     const TimeNs margin = from_seconds(options.max_gap_s);
     if (options.t_end_ns && sample.t > *options.t_end_ns && sample.t - margin > *options.t_end_ns)
       return false;
@@ -160,13 +185,22 @@ Expected<ImuReader> ImuReader::open(const std::string& path, const ImuReadOption
   return ImuReader(std::move(impl));
 }
 
+Expected<ImuReader> ImuReader::of_samples(const std::string& path,
+                                          std::shared_ptr<const std::vector<ImuSample>> samples,
+                                          const ImuReadOptions& options) {
+  auto impl = std::make_unique<Impl>(std::nullopt, options);
+  impl->path = path;
+  impl->samples = std::move(samples);
+  return ImuReader(std::move(impl));
+}
+
 Expected<bool> ImuReader::next(ImuSample& sample) {
   Impl& m = *impl_;
   const auto more = m.read_row(sample);
   if (!more) return more.error();
   if (!*more) {
     if (m.gaps > 0)
-      log_warning(text(m.lines.where(), ": ", m.gaps, " gaps of more than ", m.options.warn_gap_s,
+      log_warning(text(m.where(), ": ", m.gaps, " gaps of more than ", m.options.warn_gap_s,
                        " s, the longest ", m.longest_gap_s, " s before line ", m.longest_gap_line));
     m.gaps = 0;
     return false;

@@ -27,6 +27,10 @@ struct ImuReadOptions {
 class ImuReader {
  public:
   static Expected<ImuReader> open(const std::string& path, const ImuReadOptions& options = {});
+  /// Samples of another file, held in memory, with the same checks; errors name `path` and the sample.
+  static Expected<ImuReader> of_samples(const std::string& path,
+                                        std::shared_ptr<const std::vector<ImuSample>> samples,
+                                        const ImuReadOptions& options = {});
   ImuReader(ImuReader&& other) noexcept;
   ImuReader& operator=(ImuReader&& other) noexcept;
   ~ImuReader();

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/io/dataset_layouts.h"
+#include "evpose/io/imu_text.h"
 #include "evpose/io/imu_units.h"
 #include "evpose/io/kalibr.h"
 #include "evpose/io/numbers.h"
-#include "evpose/io/recording_yaml.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/sensor_streams.h"
+#include "evpose/io/trajectory.h"
 
 namespace evpose {
 namespace {
@@ -20,11 +22,6 @@ constexpr double kOtherEpoch_s = 1e8;
 bool exists(const std::string& path) {
   struct stat info = {};
   return ::stat(path.c_str(), &info) == 0;
-}
-
-bool is_folder(const std::string& path) {
-  struct stat info = {};
-  return ::stat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode);
 }
 
 /// A file named in recording.yaml must be there; one of the default name may be absent (then "").
@@ -38,40 +35,93 @@ TimeNs to_ns(const std::optional<double>& seconds) { return seconds ? from_secon
 
 std::string in_seconds(TimeNs t) { return format_decimal(t / kNsPerUs, 6) + " s"; }
 
-Status take_files(const RecordingOverrides& overrides, Recording& r) {
-  r.name = !overrides.name.empty() ? overrides.name : r.folder.substr(r.folder.rfind('/') + 1);
-  r.events_path = r.folder + "/" + overrides.events.value_or("events.h5");
-  r.calibration_path = r.folder + "/" + overrides.calibration.value_or("camchain-imucam.yaml");
-  r.imu_path = optional_file(r.folder, overrides.imu, "imu.csv");
-  r.groundtruth_path = optional_file(r.folder, overrides.groundtruth, "groundtruth.tum");
-  r.contours_path = optional_file(r.folder, overrides.contours, "contours.ply");
-  r.map_path = optional_file(r.folder, overrides.map, "map.h5");
+Status take_files(const FoundRecording& found, Recording& r) {
+  const RecordingOverrides& files = found.files;
+  r.name = files.name;
+  r.layout = found.layout;
+  r.missing = found.missing;
+  r.events_path = r.folder + "/" + files.events.value_or("events.h5");
+  r.calibration_path = r.folder + "/" +
+                       (found.calibration_files.empty() ? files.calibration.value_or("camchain-imucam.yaml")
+                                                        : found.calibration_files.front());
+  r.imu_path = optional_file(r.folder, files.imu, "imu.csv");
+  r.groundtruth_path = optional_file(r.folder, files.groundtruth, "groundtruth.tum");
+  r.contours_path = optional_file(r.folder, files.contours, "contours.ply");
+  r.map_path = optional_file(r.folder, files.map, "map.h5");
   r.has_imu = !r.imu_path.empty();
-  if (r.has_imu) r.imu_model_path = r.folder + "/" + overrides.imu_model.value_or("imu.yaml");
+  if (r.has_imu) r.imu_model_path = optional_file(r.folder, files.imu_model, "imu.yaml");
+  return {};
+}
+
+Status check_files(const Recording& r) {
   for (const std::string& path : {r.events_path, r.calibration_path, r.imu_path, r.imu_model_path,
                                   r.groundtruth_path, r.contours_path, r.map_path}) {
-    if (!path.empty() && !exists(path))
-      return Error{path, "no such file", "add it, or name another under files: in recording.yaml"};
+    if (path.empty() || exists(path)) continue;
+    // What the look at the folder said about it knows better where it comes from.
+    for (const Error& missing : r.missing)
+      if (missing.where == path || path == r.calibration_path) return missing;
+    return Error{path, "no such file", "add it, or name another under files: in recording.yaml"};
   }
   return {};
 }
 
-Status take_calibration(const RecordingOverrides& overrides, Recording& r, double& timeshift_s) {
-  const auto calibration = read_calibration(r.calibration_path);
+/// The camera of a calibration file; one that does not say its size has that of the events.
+Expected<CalibratedCamera> read_camera(const Recording& r, const RecordingOverrides& files,
+                                       std::optional<ImuNoise>& noise) {
+  auto calibration = read_calibration(r.calibration_path);
   if (!calibration) return calibration.error();
-  const auto camera = choose_camera(*calibration, overrides.camera_index);
+  noise = calibration->imu_noise;
+  for (CalibratedCamera& camera : calibration->cameras) {
+    if (!camera.intrinsics || camera.intrinsics->size != ImageSize{}) continue;
+    const auto events = open_events(r.events_path, files.events_format, files.event_options);
+    if (!events) return events.error();
+    camera.intrinsics->size = (*events)->size();
+  }
+  return choose_camera(*calibration, files.camera_index);
+}
+
+Status take_calibration(const FoundRecording& found, Recording& r, double& timeshift_s) {
+  std::optional<ImuNoise> noise = found.imu_noise;
+  auto camera = found.camera ? Expected<CalibratedCamera>(*found.camera) : read_camera(r, found.files, noise);
   if (!camera) return camera.error();
   r.camera = *camera->intrinsics;
   r.T_cam_body = camera->T_cam_imu.value_or(Pose{});
   timeshift_s = camera->timeshift_cam_imu_s;
   if (!r.has_imu) return {};
   if (!camera->T_cam_imu)
-    return Error{r.calibration_path,
-                 text("no T_cam_imu for cam", overrides.camera_index, ", but there is an IMU"),
+    return Error{r.calibration_path, text("no T_cam_imu for ", camera->name, ", but there is an IMU"),
                  "calibrate camera and IMU together, or remove " + r.imu_path + " to track without it"};
-  const auto noise = read_imu_noise(r.imu_model_path);
-  if (!noise) return noise.error();
+  if (!r.imu_model_path.empty()) {
+    const auto read = read_imu_noise(r.imu_model_path);
+    if (!read) return read.error();
+    noise = *read;
+  }
+  if (!noise)
+    return Error{r.folder + "/imu.yaml", "no such file: the noise of the IMU is not known",
+                 "add it as Kalibr writes it, or name another under files: in recording.yaml"};
   r.imu_noise = *noise;
+  return {};
+}
+
+/// Finds how the IMU is stored; what stands in one file with events is read as a whole.
+Status take_imu(const RecordingOverrides& files, Recording& r) {
+  r.imu_options = files.imu_options;
+  if (!r.has_imu) return {};
+  const bool is_text = r.imu_path.ends_with(".csv") || r.imu_path.ends_with(".txt");
+  if (!is_text) {
+    auto samples = std::make_shared<std::vector<ImuSample>>();
+    SensorSink sink;
+    sink.imu = [&](const ImuSample& sample) { samples->push_back(sample); };
+    if (auto status = read_sensors(r.imu_path, files.imu_topic, sink); !status) return status;
+    if (samples->empty()) return Error{r.imu_path, "holds no IMU samples", "set imu.topic, or record again"};
+    r.imu_samples = std::move(samples);
+    return {};
+  }
+  if (files.states_imu_layout || r.imu_path == r.folder + "/imu.csv") return {};
+  const auto layout = recognise_imu_text(r.imu_path);
+  if (!layout) return layout.error();
+  r.imu_options.columns = layout->columns;
+  r.imu_options.time_unit = layout->time_unit;
   return {};
 }
 
@@ -95,7 +145,6 @@ void take_options(const RecordingOverrides& overrides, double timeshift_s, Recor
   r.events_format = overrides.events_format;
   r.event_options = overrides.event_options;
   r.event_options.offset_ns = from_seconds(timeshift_s) + to_ns(overrides.offset_events_s);
-  r.imu_options = overrides.imu_options;
   if (overrides.t_start_s)
     r.event_options.t_start_ns = r.imu_options.t_start_ns = from_seconds(*overrides.t_start_s);
   if (overrides.t_end_s) r.event_options.t_end_ns = r.imu_options.t_end_ns = from_seconds(*overrides.t_end_s);
@@ -122,7 +171,7 @@ Status probe_events(Recording& r) {
 }
 
 /// What one pass over the IMU file tells.
-struct ImuSummary {
+struct ImuExtent {
   TimeNs first = 0, last = 0;
   ImuUnitCheck units;
   std::vector<ImuSample> start;  ///< for the comparison with the ground truth
@@ -130,10 +179,10 @@ struct ImuSummary {
 
 constexpr std::size_t kMostCompared = 100'000;
 
-Expected<ImuSummary> read_through(const Recording& r) {
-  auto reader = ImuReader::open(r.imu_path, r.imu_options);
+Expected<ImuExtent> read_through(const Recording& r) {
+  auto reader = open_imu(r);
   if (!reader) return reader.error();
-  ImuSummary summary;
+  ImuExtent summary;
   ImuSample sample;
   while (true) {
     const auto more = reader->next(sample);
@@ -151,7 +200,7 @@ Expected<ImuSummary> read_through(const Recording& r) {
   return summary;
 }
 
-Status check_units(const Recording& r, const RecordingOverrides& overrides, const ImuSummary& summary) {
+Status check_units(const Recording& r, const RecordingOverrides& overrides, const ImuExtent& summary) {
   // A stated unit is taken at its word.
   if (!overrides.states_accel_unit) {
     if (auto status = summary.units.check_accel(r.imu_path); !status) return status;
@@ -164,7 +213,7 @@ Status check_units(const Recording& r, const RecordingOverrides& overrides, cons
   return check_gyro_against(*groundtruth, summary.start, r.imu_path);
 }
 
-Status check_overlap(const Recording& r, const ImuSummary& imu, bool has_offset) {
+Status check_overlap(const Recording& r, const ImuExtent& imu, bool has_offset) {
   const double apart = std::abs(to_seconds(r.first_ns - imu.first));
   if (apart > kOtherEpoch_s && !has_offset)
     return Error{r.imu_path,
@@ -199,28 +248,28 @@ Status crop(const std::string& yaml, Recording& r) {
 
 }  // namespace
 
-Expected<Recording> open_recording(const std::string& folder) {
-  if (!exists(folder)) return Error{folder, "no such recording folder", "check the path"};
-  if (!is_folder(folder)) return Error{folder, "is not a folder", "name the recording's folder"};
+Expected<Recording> open_recording(const std::string& path, const std::string& calibration) {
+  auto found = find_recording(path);
+  if (!found) return found.error();
   Recording r;
-  r.folder = folder;
-  while (r.folder.size() > 1 && r.folder.ends_with('/')) r.folder.pop_back();
+  r.folder = found->folder;
   const std::string yaml = r.folder + "/recording.yaml";
-  RecordingOverrides overrides;
-  if (exists(yaml)) {
-    auto read = read_recording_yaml(yaml);
-    if (!read) return read.error();
-    overrides = *std::move(read);
+  if (auto status = take_files(*found, r); !status) return status.error();
+  if (!calibration.empty()) {
+    r.calibration_path = calibration;
+    found->camera.reset();
+    found->imu_noise.reset();
   }
+  if (auto status = check_files(r); !status) return status.error();
   double timeshift_s = 0;
-  if (auto status = take_files(overrides, r); !status) return status.error();
-  if (auto status = take_calibration(overrides, r, timeshift_s); !status) return status.error();
-  if (auto status = take_groundtruth(overrides, yaml, r); !status) return status.error();
-  take_options(overrides, timeshift_s, r);
+  if (auto status = take_calibration(*found, r, timeshift_s); !status) return status.error();
+  if (auto status = take_groundtruth(found->files, yaml, r); !status) return status.error();
+  if (auto status = take_imu(found->files, r); !status) return status.error();
+  take_options(found->files, timeshift_s, r);
   if (auto status = probe_events(r); !status) return status.error();
   if (auto status = crop(yaml, r); !status) return status.error();
   if (r.has_imu) {
-    if (auto status = check_imu(overrides, r); !status) return status.error();
+    if (auto status = check_imu(found->files, r); !status) return status.error();
   }
   return r;
 }
@@ -233,6 +282,8 @@ Expected<std::unique_ptr<EventReader>> open_events(const Recording& recording, d
 
 Expected<ImuReader> open_imu(const Recording& recording) {
   EVPOSE_CHECK(recording.has_imu);
+  if (recording.imu_samples)
+    return ImuReader::of_samples(recording.imu_path, recording.imu_samples, recording.imu_options);
   return ImuReader::open(recording.imu_path, recording.imu_options);
 }
 
@@ -240,7 +291,7 @@ Expected<std::vector<TimedPose>> read_groundtruth(const Recording& recording) {
   if (recording.groundtruth_path.empty())
     return Error{recording.folder + "/groundtruth.tum", "no such file: the recording has no ground truth",
                  "add it"};
-  auto trajectory = read_tum(recording.groundtruth_path);
+  auto trajectory = read_trajectory(recording.groundtruth_path);
   if (!trajectory) return trajectory.error();
   for (TimedPose& row : *trajectory) {
     row.t += recording.groundtruth_offset_ns;

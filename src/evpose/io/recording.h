@@ -27,18 +27,21 @@ struct InitialPose {
 /// together.
 struct Recording {
   std::string folder, name;
+  std::string layout;          ///< what it was recognised as: "recording folder", "TUM-VIE sequence", ...
+  std::vector<Error> missing;  ///< what could not be found, and where to put it; it works without
 
   CameraIntrinsics camera;
   Pose T_cam_body;  ///< identity when there is no IMU and the calibration has no extrinsics: body = camera
   bool has_imu = false;
   ImuNoise imu_noise;
 
-  std::string events_path, calibration_path;
+  std::string events_path, calibration_path;              ///< the first where a calibration has several files
   std::string imu_path, imu_model_path;                   ///< empty without IMU
   std::string groundtruth_path, contours_path, map_path;  ///< empty: none
-  std::string events_format;                              ///< "h5" or "text"
+  std::string events_format;                              ///< of event_formats.h; empty: found by content
   EventReadOptions event_options;                         ///< offset, crop, flips and size filled in
   ImuReadOptions imu_options;
+  std::shared_ptr<const std::vector<ImuSample>> imu_samples;  ///< set where a file holds more than the IMU
 
   TimeNs first_ns = 0, last_ns = 0;  ///< common span of events and IMU, inside the crop, on the IMU's clock
   std::int64_t event_count = -1;     ///< of the whole file; -1: not known
@@ -51,10 +54,12 @@ struct Recording {
   std::optional<InitialPose> initial_pose;
 };
 
-/// Reads recording.yaml, if there is one, calibration and IMU model, and checks that events and IMU exist,
-/// have plausible units and overlap. The IMU file is read through once, the events are not. Errors name the
-/// file and line.
-Expected<Recording> open_recording(const std::string& folder);
+/// Opens a recording folder, a sequence of TUM-VIE, VECtor or DSEC as downloaded, or a file that holds events
+/// (find_recording() in dataset_layouts.h tells them apart): reads recording.yaml, if there is one,
+/// calibration and IMU model, and checks that events and IMU exist, have plausible units and overlap. The IMU
+/// is read through once, the events are not. `calibration`: a file to use instead of the one found. Errors
+/// name the file and line.
+Expected<Recording> open_recording(const std::string& path, const std::string& calibration = "");
 
 Expected<std::unique_ptr<EventReader>> open_events(const Recording& recording, double packet_s = 1e-3);
 

@@ -185,8 +185,7 @@ TEST(Recording, YamlErrorsNameTheLine) {
   EXPECT_TRUE(says(error("files:\n  events: a/../../b\n"), {"recording.yaml:2", "inside the folder"}));
   EXPECT_TRUE(says(error("files:\n  events: /events.h5\n"), {"recording.yaml:2", "inside the folder"}));
   EXPECT_TRUE(says(error("files:\n  imu: other.csv\n"), {"other.csv", "no such file"}));
-  EXPECT_TRUE(says(error("events:\n  format: aedat4\n"), {"recording.yaml:2", "aedat4", "convert"}));
-  EXPECT_TRUE(says(error("events:\n  topic: /events\n"), {"recording.yaml:2", "bags"}));
+  EXPECT_TRUE(says(error("events:\n  format: aedat5\n"), {"recording.yaml:2", "aedat5", "aedat4"}));
   EXPECT_TRUE(says(error("imu:\n  gyro_unit: rpm\n"), {"recording.yaml:2", "rad/s | deg/s"}));
   EXPECT_TRUE(says(error("events:\n  flip_x: yes\n"), {"recording.yaml:2", "true nor false"}));
   EXPECT_TRUE(says(error("time:\n  t_start_s: .nan\n"), {"recording.yaml:2", "finite"}));
@@ -199,7 +198,7 @@ TEST(Recording, YamlErrorsNameTheLine) {
 TEST(Recording, MissingFilesAreNamed) {
   const TemporaryFolder parent;
   EXPECT_TRUE(says(error_line(open_recording(parent / "none")), {"none", "no such recording folder"}));
-  EXPECT_TRUE(says(error_line(open_recording(parent.file("file", ""))), {"not a folder"}));
+  EXPECT_TRUE(says(error_line(open_recording(parent.file("file", ""))), {"is no recording"}));
   for (const char* name : {"events.h5", "camchain-imucam.yaml", "imu.yaml"}) {
     const std::string folder = Parts{}.write(parent);
     std::filesystem::remove(folder + "/" + name);

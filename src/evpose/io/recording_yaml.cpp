@@ -7,6 +7,7 @@
 #include <map>
 
 #include "evpose/core/config.h"
+#include "evpose/io/event_formats.h"
 #include "evpose/io/numbers.h"
 #include "evpose/io/yaml_document.h"
 
@@ -39,7 +40,6 @@ class Keys {
   Apply choice(std::vector<std::string> choices, std::function<void(const std::string&)> set) const;
   Apply seconds(std::optional<double>& target, double limit) const;
   Apply transform(std::optional<Pose>& target) const;
-  Apply unserved(std::string what) const;
   Status initial_pose(const YamlNode& node) const;
 
   const YamlDocument& document_;
@@ -82,16 +82,17 @@ void Keys::add_streams() {
   keys_["events.format"] = [this](const YamlNode& node, const std::string& key) -> Status {
     const auto value = document_.string(node, key);
     if (!value) return value.error();
+    const auto formats = event_formats();
+    std::string known;
+    for (const EventFormat& format : formats) known += (known.empty() ? "" : ", ") + std::string(format.name);
+    if (std::none_of(formats.begin(), formats.end(),
+                     [&](const auto& format) { return *value == format.name; }))
+      return document_.error(node, key + ": '" + *value + "' is unknown", "use one of " + known);
     out_.events_format = *value;
-    if (*value == "h5" || *value == "text") return {};
-    const std::vector<std::string> others = {"raw",     "dat",     "metavision_h5", "aedat4",
-                                             "rosbag1", "rosbag2", "mcap"};
-    const bool known = std::find(others.begin(), others.end(), *value) != others.end();
-    return document_.error(node, key + ": '" + *value + (known ? "' cannot be read yet" : "' is unknown"),
-                           "convert the events to h5 or text");
+    return {};
   };
-  keys_["events.topic"] = unserved("topics of bags");
-  keys_["imu.topic"] = unserved("topics of bags");
+  keys_["events.topic"] = text_value(out_.event_options.topic);
+  keys_["imu.topic"] = text_value(out_.imu_topic);
   keys_["events.time_unit"] =
       choice({"us", "ns", "s"}, [this](const auto& v) { out_.event_options.time_unit = v; });
   keys_["events.resolution"] = [this](const YamlNode& node, const std::string& key) -> Status {
@@ -115,8 +116,10 @@ void Keys::add_streams() {
     out_.camera_index = static_cast<int>(*index);
     return {};
   };
-  keys_["imu.time_unit"] =
-      choice({"ns", "us", "s"}, [this](const auto& v) { out_.imu_options.time_unit = v; });
+  keys_["imu.time_unit"] = choice({"ns", "us", "s"}, [this](const auto& v) {
+    out_.imu_options.time_unit = v;
+    out_.states_imu_layout = true;
+  });
   keys_["imu.gyro_unit"] = choice({"rad/s", "deg/s"}, [this](const auto& v) {
     out_.imu_options.gyro_in_degrees = v == "deg/s";
     out_.states_gyro_unit = true;
@@ -132,6 +135,7 @@ void Keys::add_streams() {
       const auto name = document_.string(item, key);
       if (!name) return name.error();
       out_.imu_options.columns.push_back(*name);
+      out_.states_imu_layout = true;
     }
     return {};
   };
@@ -249,13 +253,6 @@ Apply Keys::transform(std::optional<Pose>& target) const {
     if (!value) return value.error();
     target = *value;
     return {};
-  };
-}
-
-Apply Keys::unserved(std::string what) const {
-  return [this, what = std::move(what)](const YamlNode& node, const std::string& key) -> Status {
-    return document_.error(node, key + ": " + what + " cannot be read yet",
-                           "convert the recording to h5 and csv files");
   };
 }
 

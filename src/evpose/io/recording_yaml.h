@@ -12,8 +12,9 @@ namespace evpose {
 struct RecordingOverrides {
   std::string name;
   std::optional<std::string> events, imu, groundtruth, calibration, imu_model, contours, map;
-  std::string events_format;
-  int camera_index = 0;
+  std::string events_format, imu_topic;
+  int camera_index = -1;           ///< -1: the first that sees events, else the first
+  bool states_imu_layout = false;  ///< columns or time unit of imu.csv
   bool states_gyro_unit = false, states_accel_unit = false;  ///< then they are taken at their word
   EventReadOptions event_options;
   ImuReadOptions imu_options;

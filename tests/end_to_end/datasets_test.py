@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Data sets as downloaded are tracked as our own recording of the same motion is. datasets_test.py EVPOSE"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import h5py  # noqa: F401: the recordings need it
+    import numpy as np
+except ImportError as missing:
+    print(f"skipped: {missing}: scripts/packages.sh test")
+    sys.exit(77)
+
+import layouts
+from recording import Recording
+
+EVPOSE = None
+
+
+def run(*words):
+    return subprocess.run([EVPOSE, *map(str, words)], capture_output=True, text=True, timeout=60,
+                          stdin=subprocess.DEVNULL)
+
+
+class DatasetsTest(unittest.TestCase):
+    def setUp(self):
+        self.scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(self.scratch.cleanup)
+        self.root = pathlib.Path(self.scratch.name)
+        self.recording = Recording()
+
+    def tracked(self, recording, *more):
+        """Rows of the trajectory of a run."""
+        output = self.root / f"run{len(list(self.root.iterdir()))}"
+        result = run("track", recording, "-o", output, *more)
+        self.assertEqual(result.returncode, 0, result.stderr + result.stdout)
+        return np.loadtxt(output / "trajectory.tum")
+
+    def assert_same_run(self, rows, expected, epoch_s=0):
+        self.assertEqual(rows.shape, expected.shape)
+        self.assertLess(np.abs(rows[:, 0] - epoch_s - expected[:, 0]).max(), 1e-6)
+        self.assertLess(np.abs(rows[:, 1:4] - expected[:, 1:4]).max(), 1e-5, "metres")
+        self.assertLess(np.abs(rows[:, 4:] - expected[:, 4:]).max(), 1e-5)
+
+    def info(self, path):
+        result = run("info", path, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout)
+
+    def test_tum_vie(self):
+        expected = self.tracked(self.recording.write(self.root / "own"))
+        folder = layouts.write_tum_vie(self.root / "mocap-desk", self.recording)
+        self.assert_same_run(self.tracked(folder), expected)
+        told = self.info(folder)
+        self.assertEqual(told["recording"]["layout"], "TUM-VIE sequence")
+        self.assertTrue(told["recording"]["ready"])
+        self.assertEqual(told["events"]["count"], len(self.recording.t))
+
+    def test_tum_vie_names_what_is_missing_and_where_it_belongs(self):
+        folder = layouts.write_tum_vie(self.root / "bike-easy", self.recording, "bike-easy", "A")
+        told = self.info(folder)
+        self.assertFalse(told["recording"]["ready"])
+        lines = [finding["where"] for finding in told["findings"]]
+        self.assertIn(str(folder / "camera-calibrationB.json"), lines)
+        result = run("track", folder)
+        self.assertEqual(result.returncode, 2)
+        self.assertRegex(result.stderr, r"^evpose: .*camera-calibrationB\.json: no such file.*; download it")
+        for name in ("imu_data.txt", "mocap_data.txt"):
+            (folder / name).unlink()
+        whats = " ".join(finding["fix"] for finding in self.info(folder)["findings"])
+        self.assertIn("bike-easy-vi_gt_data.tar.gz", whats)
+
+    def test_vector(self):
+        expected = self.tracked(self.recording.write(self.root / "own"))
+        folder = layouts.write_vector(self.root / "vector", self.recording)
+        self.assert_same_run(self.tracked(folder), expected, epoch_s=1_640_000_000)
+        self.assertEqual(self.info(folder)["recording"]["layout"], "VECtor sequence")
+
+    def test_vector_without_calibration_says_where_to_get_it(self):
+        folder = layouts.write_vector(self.root / "vector", self.recording)
+        for file in (self.root / "vector/small_scale_calibration").iterdir():
+            file.unlink()
+        result = run("track", folder)
+        self.assertEqual(result.returncode, 2)
+        self.assertRegex(result.stderr, r"left_event_camera_intrinsic.*no such file.*; download the calibration")
+
+    def test_dsec_without_imu(self):
+        folder = self.root / "zurich"
+        (folder / "events/left").mkdir(parents=True)
+        layouts.write_events(folder / "events/left/events.h5", self.recording, t_offset=np.int64(0))
+        camera = (f"{{camera_matrix: [{layouts.FOCAL}, {layouts.FOCAL}, {(layouts.WIDTH - 1) / 2}, "
+                  f"{(layouts.HEIGHT - 1) / 2}], distortion_coeffs: [0, 0, 0, 0], distortion_model: radtan, "
+                  f"camera_model: pinhole, camera_type: event, resolution: [{layouts.WIDTH}, {layouts.HEIGHT}]}}")
+        (folder / "cam_to_cam.yaml").write_text(f"intrinsics:\n  cam0: {camera}\nextrinsics: {{}}\n")
+        told = self.info(folder)
+        self.assertEqual(told["recording"]["layout"], "DSEC sequence")
+        self.assertTrue(told["recording"]["ready"], told["findings"])
+        self.recording.write_contours(folder / "contours.ply")
+        T = np.linalg.inv(layouts.T_CAM_IMU)
+        p = T[:3, 3] + [0, 0, 1]
+        start = ",".join(str(float(v)) for v in (*p, *layouts.quaternion(T[:3, :3])))
+        rows = self.tracked(folder, "--init", start)
+        self.assertGreater(len(rows), 100)
+
+    def test_a_folder_whose_files_tell_by_themselves(self):
+        """As people keep them: other names, another tool's calibration, stamps in seconds."""
+        expected = self.tracked(self.recording.write(self.root / "own"))
+        folder = self.root / "mine"
+        folder.mkdir()
+        layouts.write_events(folder / "flight.h5", self.recording)
+        (folder / "my_imu.txt").write_text("# t gx gy gz ax ay az\n" + "\n".join(
+            f"{t / 1e9:.9f} " + " ".join(f"{v:.7f}" for v in row)
+            for t, row in zip(self.recording.imu_t_ns, self.recording.imu)) + "\n")
+        (folder / "calib.yaml").write_text(self.recording.calibration)
+        (folder / "imu.yaml").write_text(self.recording.imu_model)
+        own = self.root / "own"
+        (folder / "groundtruth.txt").write_text((own / "groundtruth.tum").read_text())
+        self.recording.write_contours(folder / "contours.ply")
+        self.assert_same_run(self.tracked(folder), expected)
+
+    def test_calibration_can_be_given(self):
+        folder = self.recording.write(self.root / "own")
+        expected = self.tracked(folder)
+        (folder / "camchain-imucam.yaml").rename(self.root / "elsewhere.yaml")
+        self.assert_same_run(self.tracked(folder, "--calibration", self.root / "elsewhere.yaml"), expected)
+        self.assertEqual(run("track", folder).returncode, 2)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    EVPOSE = sys.argv.pop(1)
+    unittest.main()

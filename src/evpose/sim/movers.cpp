@@ -51,7 +51,7 @@ class Gait {
   Pose pose(const Limb& part, double t_s) const {
     const double way = start_ + speed_ * t_s;
     const double phase = kTurn * way / stride() + (part.side < 0 ? std::numbers::pi : 0);
-    const Pose T_map_body =
+    Pose T_map_body =
         on_path(path_.at(way)) * shifted({0, 0, hip() + 0.012 * h_ * std::cos(2 * phase)});
     switch (part.kind) {
       case Limb::torso:

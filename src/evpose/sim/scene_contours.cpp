@@ -192,7 +192,8 @@ class Taken {
   bool has(const ContourPoint& p) const {
     const Eigen::Array3d place = (p.position.cast<double>() / cell_).array().floor();
     for (int k = 0; k < 27; ++k) {
-      const auto found = cells_.find(key(place + Eigen::Array3d(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
+      const Eigen::Array3i step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+      const auto found = cells_.find(key(place + step.cast<double>()));
       if (found == cells_.end()) continue;
       for (const ContourPoint& other : found->second) {
         const Eigen::Vector3f d = p.position - other.position;

@@ -85,7 +85,7 @@ Eigen::Vector3d SceneFields::vector(const std::string& key, const Eigen::Vector3
     error_ = value.error();
     return otherwise;
   }
-  const Eigen::Vector3d out((*value)[0], (*value)[1], (*value)[2]);
+  Eigen::Vector3d out((*value)[0], (*value)[1], (*value)[2]);
   if (out.cwiseAbs().maxCoeff() > kFarthest_m) fail(*found, key + ": farther than 100 km", "give metres");
   return out;
 }
@@ -97,7 +97,7 @@ Eigen::Vector3d SceneFields::needed_vector(const std::string& key) {
 
 Eigen::Vector3d SceneFields::needed_size(const std::string& key, double least) {
   const YamlNode* found = needed(key);
-  const Eigen::Vector3d size =
+  Eigen::Vector3d size =
       found == nullptr ? Eigen::Vector3d(Eigen::Vector3d::Ones()) : vector(key, Eigen::Vector3d::Ones());
   if (found != nullptr && (size.minCoeff() < least || size.maxCoeff() > 1000))
     fail(*found, text(key, ": each must be between ", least, " and 1000 m"), "correct it");

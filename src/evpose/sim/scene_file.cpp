@@ -25,8 +25,8 @@ constexpr double kMostTexels = 5e7;  // 130 MB with its smaller scales
 
 class SceneReader {
  public:
-  SceneReader(const YamlDocument& document, WorldConfig world)
-      : document_(document), world_(std::move(world)), draft_(world_) {}
+  SceneReader(const YamlDocument& document, const WorldConfig& world)
+      : document_(document), world_(world), draft_(world_) {}
 
   Expected<Scene> read(ThreadPool& pool) {
     SceneFields top(document_, document_.root, "scene");

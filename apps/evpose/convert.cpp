@@ -29,6 +29,12 @@ bool names_folder(const std::string& path) {
   return path.ends_with('/') || !std::filesystem::path(path).has_extension();
 }
 
+/// Holds more than events.
+bool names_bag(const ConvertRequest& r) {
+  if (!r.output_format.empty()) return r.output_format == "rosbag1" || r.output_format == "mcap";
+  return r.output.ends_with(".bag") || r.output.ends_with(".mcap");
+}
+
 /// Writing over what is being read would destroy it.
 Status check_output(const ConvertRequest& r) {
   std::error_code ignored;
@@ -61,9 +67,12 @@ Expected<int> convert(const ConvertRequest& request) {
   switch (*kind) {
     case InputKind::recording:
       return names_folder(request.output) ? convert_to_recording(request)
+             : names_bag(request)         ? convert_to_bag(request)
                                           : convert_events_of_recording(request);
     case InputKind::events:
-      return names_folder(request.output) ? convert_to_recording(request) : convert_events(request);
+      return names_folder(request.output) ? convert_to_recording(request)
+             : names_bag(request)         ? convert_to_bag(request)
+                                          : convert_events(request);
     case InputKind::trajectory:
       return convert_trajectory(request);
     case InputKind::imu:

@@ -72,6 +72,7 @@ Expected<bool> copy_events(EventReader& reader, const EventFilter& filter, Event
 // The kinds of conversion; each gives the exit status or an error.
 Expected<int> convert_events(const ConvertRequest& request);
 Expected<int> convert_to_recording(const ConvertRequest& request);
+Expected<int> convert_to_bag(const ConvertRequest& request);
 Expected<int> convert_trajectory(const ConvertRequest& request);
 Expected<int> convert_imu(const ConvertRequest& request);
 Expected<int> convert_calibration(const ConvertRequest& request);

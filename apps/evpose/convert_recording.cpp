@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 
 #include "convert_parts.h"
+#include "evpose/io/bag_writer.h"
 #include "evpose/io/imu_csv.h"
 #include "evpose/io/kalibr.h"
 #include "evpose/io/new_folder.h"
@@ -69,6 +71,11 @@ Expected<Source> from_recording(const Recording& r, const ConvertRequest& reques
     if (!truth) return truth.error();
     out.groundtruth = *std::move(truth);
   }
+  if (r.groundtruth_path.empty() && fs::is_regular_file(request.input)) {
+    SensorSink sink;
+    sink.pose = [&](const TimedPose& pose) { out.groundtruth.push_back(pose); };
+    if (auto status = read_sensors(request.input, "", sink); !status) return status.error();
+  }
   CalibratedCamera camera;
   camera.intrinsics = r.camera;
   if (r.has_imu) camera.T_cam_imu = r.T_cam_body;
@@ -92,6 +99,7 @@ Expected<Source> from_file(const ConvertRequest& request) {
   out.events = *std::move(events);
   SensorSink sink;
   sink.imu = [&](const ImuSample& sample) { out.imu.push_back(sample); };
+  sink.pose = [&](const TimedPose& pose) { out.groundtruth.push_back(pose); };
   if (auto status = read_sensors(request.input, "", sink); !status) return status.error();
   out.missing.push_back("camchain-imucam.yaml: the input has no calibration; give it with --calibration");
   if (!out.imu.empty()) out.missing.push_back("imu.yaml: the noise of the IMU is not known");
@@ -134,7 +142,66 @@ Status write_rest(const NewFolder& folder, const std::string& place, const Sourc
   return {};
 }
 
+/// A bag's events, and between them what else the source has, in order of time.
+class BagOfAll : public EventWriter {
+ public:
+  BagOfAll(BagWriter bag, const Source& source) : bag_(std::move(bag)), source_(source) {}
+
+  Status append(const EventPacket& packet) override {
+    if (Status done = others_until(packet.base); !done) return done;
+    return bag_.append(packet);
+  }
+  Status finish() override {
+    if (Status done = others_until(std::numeric_limits<TimeNs>::max()); !done) return done;
+    return bag_.finish();
+  }
+
+ private:
+  Status others_until(TimeNs t) {
+    const std::vector<ImuSample>& imu = source_.imu;
+    const std::vector<TimedPose>& poses = source_.groundtruth;
+    while (imu_ < imu.size() || pose_ < poses.size()) {
+      const bool sample = pose_ == poses.size() || (imu_ < imu.size() && imu[imu_].t <= poses[pose_].t);
+      if ((sample ? imu[imu_].t : poses[pose_].t) > t) return {};
+      if (Status done = sample ? bag_.append(imu[imu_++]) : bag_.append(poses[pose_++]); !done) return done;
+    }
+    return {};
+  }
+
+  BagWriter bag_;
+  const Source& source_;
+  std::size_t imu_ = 0, pose_ = 0;
+};
+
 }  // namespace
+
+Expected<int> convert_to_bag(const ConvertRequest& request) {
+  auto source = open_source(request);
+  if (!source) return source.error();
+  const ImageSize size = source->camera ? source->camera->intrinsics->size : source->events->size();
+  // Only events, whose size has to be searched for.
+  if (size == ImageSize{}) return convert_events(request);
+  const auto filter = EventFilter::make(request, size);
+  if (!filter) return filter.error();
+  const Crop crop = crop_of(request, source->first);
+  const TimeNs offset = from_seconds(request.offset_s);
+  shift_and_crop(source->imu, crop, offset);
+  shift_and_crop(source->groundtruth, crop, offset);
+  auto bag = BagWriter::create(request.output, size, {.format = request.output_format});
+  if (!bag) return bag.error();
+  BagOfAll writer(*std::move(bag), *source);
+  ConvertCounts counts;
+  const auto whole = copy_events(*source->events, *filter, writer, counts);
+  if (!whole) return whole.error();
+  if (!*whole) return kInterruptedStatus;
+  if (counts.written == 0)
+    return Error{request.input, "no events are left to be written",
+                 "widen the crop, the region or the polarity"};
+  if (Status done = writer.finish(); !done) return done.error();
+  std::printf("%s: %lld events, %zu IMU samples, %zu poses\n", request.output.c_str(),
+              static_cast<long long>(counts.written), source->imu.size(), source->groundtruth.size());
+  return 0;
+}
 
 Expected<int> convert_to_recording(const ConvertRequest& request) {
   auto source = open_source(request);

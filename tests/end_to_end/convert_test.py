@@ -68,7 +68,7 @@ class ConvertTest(unittest.TestCase):
         return columns(self.root / "out.h5")
 
     def test_events_through_every_format_and_back(self):
-        for name in ("a.h5", "a.raw", "a.txt", "a.csv"):
+        for name in ("a.h5", "a.raw", "a.txt", "a.csv", "a.bag", "a.mcap"):
             with self.subTest(name=name):
                 self.convert(self.events, self.root / name)
                 self.convert(self.root / name, self.root / "back.h5", "--size", f"{WIDTH},{HEIGHT}")
@@ -128,6 +128,20 @@ class ConvertTest(unittest.TestCase):
         self.assertTrue((self.root / "own/contours.ply").exists())
         result = subprocess.run([EVPOSE, "track", self.root / "own", "-o", self.root / "run"], capture_output=True, timeout=60)
         self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_a_recording_through_bags_and_back(self):
+        known = np.loadtxt(self.folder / "imu.csv", delimiter=",", skiprows=1)
+        truth = np.loadtxt(self.folder / "groundtruth.tum")
+        (self.root / "imu.yaml").write_text((self.folder / "imu.yaml").read_text())  # no bag holds it
+        for name in ("all.bag", "all.mcap"):
+            with self.subTest(name=name):
+                said = self.convert(self.folder, self.root / name)
+                self.assertIn(f"{len(known)} IMU samples, {len(truth)} poses", said)
+                back = self.root / (name[4:] + "_back")
+                self.convert(self.root / name, back, "--calibration", self.folder / "camchain-imucam.yaml")
+                np.testing.assert_array_equal(columns(back / "events.h5"), self.known)
+                np.testing.assert_allclose(np.loadtxt(back / "imu.csv", delimiter=",", skiprows=1), known, atol=1e-9)
+                np.testing.assert_allclose(np.loadtxt(back / "groundtruth.tum"), truth, atol=1e-8)
 
     def test_trajectories(self):
         source = self.folder / "groundtruth.tum"

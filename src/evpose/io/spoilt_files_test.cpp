@@ -6,10 +6,10 @@
 #include <random>
 
 #include "evpose/core/log.h"
+#include "evpose/io/calibration.h"
 #include "evpose/io/contour_files.h"
 #include "evpose/io/events_h5.h"
 #include "evpose/io/imu_csv.h"
-#include "evpose/io/calibration.h"
 #include "evpose/io/map_h5.h"
 #include "evpose/io/ply.h"
 #include "evpose/io/recording_yaml.h"

@@ -51,8 +51,7 @@ class Gait {
   Pose pose(const Limb& part, double t_s) const {
     const double way = start_ + speed_ * t_s;
     const double phase = kTurn * way / stride() + (part.side < 0 ? std::numbers::pi : 0);
-    Pose T_map_body =
-        on_path(path_.at(way)) * shifted({0, 0, hip() + 0.012 * h_ * std::cos(2 * phase)});
+    Pose T_map_body = on_path(path_.at(way)) * shifted({0, 0, hip() + 0.012 * h_ * std::cos(2 * phase)});
     switch (part.kind) {
       case Limb::torso:
         return T_map_body * turned({0, 0, 0}, {0, 0.05, 0.06 * std::sin(phase)});

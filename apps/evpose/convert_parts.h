@@ -36,7 +36,7 @@ struct ConvertCounts {
 /// rounded to the nearest pixel.
 class UndistortTable {
  public:
-  explicit UndistortTable(const Camera& camera, const CameraIntrinsics& intrinsics);
+  UndistortTable(const Camera& camera, const CameraIntrinsics& c);
   /// False where the pixel falls out of the image.
   bool move(Event& event) const;
 

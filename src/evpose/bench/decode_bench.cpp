@@ -29,14 +29,15 @@ std::vector<EventPacket> synthetic_packets() {
   for (std::size_t made = 0; made < kEvents;) {
     EventPacket packet;
     packet.base = 1000 * kNsPerUs * static_cast<TimeNs>(t_us / 1000);
+    const TimeNs whole_us = packet.base / kNsPerUs;
+    const auto base_us = static_cast<double>(whole_us);
     const double end_us = 1000.0 * static_cast<double>(packets.size() + 1);
     while (t_us < end_us && made < kEvents) {
       const int run = 1 + static_cast<int>(random() % 5), y = static_cast<int>(random() % 720);
       const int x = static_cast<int>(random() % 1270);
       const bool on = random() % 2 == 0;
       for (int i = 0; i < run; ++i, ++made)
-        packet.events.push_back(make_event(
-            static_cast<std::uint32_t>(t_us - static_cast<double>(packet.base / kNsPerUs)), x + i, y, on));
+        packet.events.push_back(make_event(static_cast<std::uint32_t>(t_us - base_us), x + i, y, on));
       t_us += run / kRateMevS;
     }
     packets.push_back(std::move(packet));
@@ -112,7 +113,7 @@ std::string file_of(const std::string& content) {
 
 /// Through a writer, which needs a name of its own on a disk.
 std::string written(const std::vector<EventPacket>& packets, const std::string& extension) {
-  const std::string path =
+  std::string path =
       std::filesystem::temp_directory_path() / ("evpose-bench-" + std::to_string(::getpid()) + extension);
   auto writer = create_event_writer(path, "", kSize);
   if (!writer) std::abort();

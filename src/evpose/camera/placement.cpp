@@ -33,7 +33,7 @@ std::string heading_in_words(double x, double y) {
   const double heading = std::atan2(y, x) / kDegree;  // to the left
   const auto quarter = static_cast<int>(std::lround(heading / 90));
   const double rest = heading - 90.0 * quarter;
-  const std::string side = kSides[static_cast<std::size_t>((quarter + 4) % 4)];
+  std::string side = kSides[static_cast<std::size_t>((quarter + 4) % 4)];
   if (std::abs(rest) < 0.5) return side;
   const std::string other = kSides[static_cast<std::size_t>((quarter + (rest > 0 ? 5 : 3)) % 4)];
   return text(std::round(std::abs(rest)), " deg ", other, " of ", side);

@@ -50,7 +50,7 @@ struct BagWriter::Impl {
 
   Status check_time(TimeNs t) const;
   void begin(const Topic& topic, TimeNs stamp);
-  void write(Topic& topic, TimeNs t);
+  void write(Topic& topic, TimeNs t) const;
   void flush();
   void put_array();
   void put_packet();
@@ -70,7 +70,7 @@ void BagWriter::Impl::begin(const Topic& topic, TimeNs stamp) {
   message.string(topic.frame);
 }
 
-void BagWriter::Impl::write(Topic& topic, TimeNs t) {
+void BagWriter::Impl::write(Topic& topic, TimeNs t) const {
   if (!topic.number) topic.number = container->add_topic(topic.name, topic.type);
   container->write(*topic.number, t, message.data());
   ++topic.messages;

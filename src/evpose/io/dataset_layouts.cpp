@@ -271,7 +271,7 @@ bool holds_events(const std::string& path) {
 std::optional<std::string> find_events(const Look& look) {
   for (const char* usual :
        {"events.h5", "events.raw", "events.txt", "events.csv", "events.aedat4", "events.bag"})
-    if (const auto name = look.find(usual)) return name;
+    if (auto name = look.find(usual)) return name;
   for (const std::string& name : look.files())
     if (holds_events(name) && base_name(name).find("map") == std::string::npos &&
         base_name(name).find("right") == std::string::npos)

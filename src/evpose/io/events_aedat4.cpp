@@ -110,7 +110,7 @@ Status give_triggers(const FlatTable& packet, const std::string& path, const Sen
     if (!trigger) continue;
     const auto t = time_of(*trigger, 0, path);
     if (!t) return t.error();
-    const int kind = trigger->number<std::int8_t>(1);
+    const int kind = trigger->number<std::uint8_t>(1);
     const bool on = kind == kRising || kind == kPulse || kind == kGeneratorRising || kind == kFrameBegin ||
                     kind == kExposureBegin;
     sink.trigger({*t, on, kind});
@@ -127,7 +127,7 @@ Status give_frame(const FlatTable& f, const std::string& path, const SensorSink&
     if (!*t) return t->error();
   GreyFrame frame;
   frame.t = *begin > 0 && *end >= *begin ? *begin + (*end - *begin) / 2 : *time;
-  const int format = f.number<std::int8_t>(kFormat);
+  const int format = f.number<std::uint8_t>(kFormat);
   frame.channels = format == 0 ? 1 : format == 16 ? 3 : format == 24 ? 4 : 0;
   frame.width = f.number<std::int16_t>(kSizeX);
   frame.height = f.number<std::int16_t>(kSizeY);

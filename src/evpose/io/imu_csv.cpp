@@ -151,7 +151,7 @@ Expected<bool> ImuReader::Impl::read_one(ImuSample& sample) {
 
 Expected<bool> ImuReader::Impl::read_row(ImuSample& sample) {
   while (true) {
-    const auto more = read_one(sample);
+    auto more = read_one(sample);
     if (!more || !*more) return more;
     const TimeNs margin = from_seconds(options.max_gap_s);
     if (options.t_end_ns && sample.t > *options.t_end_ns && sample.t - margin > *options.t_end_ns)

@@ -13,8 +13,8 @@ enum class EventCause : std::uint8_t { signal = 0, leak = 1, shot = 2, hot = 3 }
 /// What a pixel looked at when it fired.
 enum class EventOrigin : std::uint8_t {
   texture = 0,  ///< within one flat or smooth surface: print, shadow, shading, light
-  edge = 1,     ///< a crease or an outline of what stands still runs through the pixel or its neighbour
-  moving = 2,   ///< a moving thing is in the pixel, or was in this time step
+  edge = 1,    ///< a crease or an outline of what stands still runs through the pixel, now or a sample before
+  moving = 2,  ///< a moving thing is in the pixel, now or a sample before
 };
 
 /// An event with its truth.

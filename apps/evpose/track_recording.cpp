@@ -25,25 +25,6 @@ constexpr std::size_t kUnitCheckSamples = 20'000;  // of the IMU, looked at befo
 constexpr std::size_t kDrawnMapPoints = 20'000;    // handed to the report
 constexpr double kOverlayDecay_s = 0.02;
 
-double wall_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double cpu_s() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-double peak_memory_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;
-}
-
 Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
                                                      const Recording& recording) {
   std::string path = request.map;
@@ -108,29 +89,26 @@ Status feed(const Recording& recording, const RunConfig& config, Tracker& tracke
   }
 }
 
-RunSummary summarise(const Recording& recording, const TrackRequest& request, const ContourMap& map,
-                     const Tracker& tracker, std::vector<TimedPose> truth, const Pose& T_body_cam) {
-  RunSummary summary;
-  summary.title = recording.name;
-  const auto name = [](const std::string& path) { return path.substr(path.find_last_of('/') + 1); };
-  summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",
-                          map.occluders.triangles.empty() ? "" : ", with occluders",
-                          "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
-  summary.T_body_cam = T_body_cam;
-  summary.truth = std::move(truth);
-  const std::size_t step = map.points.size() / kDrawnMapPoints + 1;
-  for (std::size_t i = 0; i < map.points.size(); i += step) summary.map_points.push_back(map.position(i));
-  const auto& counts = tracker.events().counts();
-  summary.events_read = static_cast<std::uint64_t>(counts.read);
-  summary.events_kept = static_cast<std::uint64_t>(counts.kept);
-  for (const auto& p : tracker.events().filter().hot_pixels()) summary.hot_pixels.emplace_back(p.x, p.y);
-  summary.versions = {
-      {"compiler", __VERSION__},
-      {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};
-  return summary;
+}  // namespace
+
+double wall_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-}  // namespace
+double cpu_s() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
 
 void describe(ConfigTable& table, RunConfig& c) {
   describe(table, c.tracker);
@@ -149,9 +127,9 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
   return config;
 }
 
-Expected<RunOutcome> track_recording(const TrackRequest& request) {
-  auto config = load_config(request);
-  if (!config) return config.error();
+Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config) {
+  TrackJob job;
+  job.config = config;
   const auto recording = open_recording(request.recording, request.calibration);
   if (!recording) return recording.error();
   auto map = load_map(request, *recording);
@@ -166,52 +144,89 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   }
   if (recording->has_imu)
     if (auto ok = check_units(*recording, truth); !ok) return ok.error();
-  const auto start = choose_start(request.init, *recording, truth, &config->tracker.ekf);
+  const auto start = choose_start(request.init, *recording, truth, &job.config.tracker.ekf);
   if (!start) return start.error();
+  job.recording = *recording;
+  job.map = *map;
+  job.truth = std::move(truth);
+  job.start = *start;
+  job.setup = {*camera, recording->T_cam_body.inverse(),
+               recording->has_imu ? MotionModel::imu : MotionModel::constant_velocity, recording->imu_noise,
+               *map};
+  return job;
+}
+
+RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker) {
+  const Recording& recording = job.recording;
+  const ContourMap& map = *job.map;
+  RunSummary summary;
+  summary.title = recording.name;
+  const auto name = [](const std::string& path) { return path.substr(path.find_last_of('/') + 1); };
+  summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",
+                          map.occluders.triangles.empty() ? "" : ", with occluders",
+                          "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
+  summary.T_body_cam = job.setup.T_body_cam;
+  summary.truth = job.truth;
+  const std::size_t step = map.points.size() / kDrawnMapPoints + 1;
+  for (std::size_t i = 0; i < map.points.size(); i += step) summary.map_points.push_back(map.position(i));
+  const auto& counts = tracker.events().counts();
+  summary.events_read = static_cast<std::uint64_t>(counts.read);
+  summary.events_kept = static_cast<std::uint64_t>(counts.kept);
+  for (const auto& p : tracker.events().filter().hot_pixels()) summary.hot_pixels.emplace_back(p.x, p.y);
+  summary.versions = {
+      {"compiler", __VERSION__},
+      {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};
+  return summary;
+}
+
+Expected<RunOutcome> track_recording(const TrackRequest& request) {
+  const auto asked = load_config(request);
+  if (!asked) return asked.error();
+  auto job = prepare(request, *asked);
+  if (!job) return job.error();
+  RunConfig& config = job->config;
+  const StartState& start = job->start;
   auto run = RunFolder::create(request.output);
   if (!run) return run.error();
 
-  const TrackerSetup setup{*camera, recording->T_cam_body.inverse(),
-                           recording->has_imu ? MotionModel::imu : MotionModel::constant_velocity,
-                           recording->imu_noise, *map};
-  auto tracker = Tracker::create(setup, config->tracker, *start, wall_s);
+  auto tracker = Tracker::create(job->setup, config.tracker, start, wall_s);
   if (!tracker) return tracker.error();
   int most_points = 0;
   std::int64_t updates = 0;
-  TimeNs next_overlay = start->t;
-  const TimeNs overlay_step = (recording->last_ns - start->t) / (config->overlays + 1);
+  TimeNs next_overlay = start.t;
+  const TimeNs overlay_step = (job->recording.last_ns - start.t) / (config.overlays + 1);
   (*tracker)->on_update([&](const Update& u) {
     run->add(u);
     ++updates;
     most_points = std::max(most_points, u.points);
-    if (updates == 1) next_overlay = start->t + overlay_step;
-    if (u.t < next_overlay || config->overlays == 0) return;
+    if (updates == 1) next_overlay = start.t + overlay_step;
+    if (u.t < next_overlay || config.overlays == 0) return;
     next_overlay += overlay_step;
     const Tracker::Snapshot s = (*tracker)->snapshot(kOverlayDecay_s);
     std::vector<OverlayPoint> points;
     for (const auto& p : s.points) points.push_back({p.x, p.y, p.matched});
-    run->add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start->t)), " s"),
+    run->add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start.t)), " s"),
                      draw_overlay(s.size.width, s.size.height, s.decay, points));
   });
 
   const double wall_start = wall_s(), cpu_start = cpu_s();
   Progress progress("tracking");
-  if (auto ok = feed(*recording, *config, **tracker, progress); !ok) return ok.error();
+  if (auto ok = feed(job->recording, config, **tracker, progress); !ok) return ok.error();
   progress.done();
   if (updates == 0)
     return Error{request.recording, "the streams end before the first update",
                  "check that events and IMU cover the start"};
   if (most_points == 0)
-    return Error{(*map)->source,
-                 text("none of the map's ", (*map)->points.size(), " points ever comes into view"),
+    return Error{job->map->source,
+                 text("none of the map's ", job->map->points.size(), " points ever comes into view"),
                  "check the map's frame, the start pose and the extrinsics T_cam_imu"};
 
-  RunSummary summary = summarise(*recording, request, **map, **tracker, std::move(truth), setup.T_body_cam);
+  RunSummary summary = summarise(*job, request, **tracker);
   summary.wall_s = wall_s() - wall_start;
   summary.cpu_s = cpu_s() - cpu_start;
   summary.peak_memory_mb = peak_memory_mb();
   ConfigTable table;
-  describe(table, *config);
+  describe(table, config);
   return run->finish(summary, table);
 }
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "evpose/core/config.h"
 #include "evpose/core/error.h"
+#include "evpose/io/recording.h"
 #include "evpose/report/run_folder.h"
 #include "evpose/tracker/tracker.h"
 
@@ -32,6 +34,24 @@ struct TrackRequest {
 
 /// Settings after the file and the assignments of the request.
 Expected<RunConfig> load_config(const TrackRequest& request);
+
+/// All that a tracker wants to know before the first event.
+struct TrackJob {
+  RunConfig config;
+  Recording recording;
+  std::shared_ptr<const ContourMap> map;
+  std::vector<TimedPose> truth;  ///< empty: not known
+  StartState start;
+  TrackerSetup setup;
+};
+/// Reads and checks everything but the events.
+Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
+/// What the run folder is told at the end; without times and memory.
+RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker);
+
+double wall_s();          ///< on a monotone clock
+double cpu_s();           ///< processor time of the program
+double peak_memory_mb();  ///< of the program
 
 /// The main job: recording and map in, run folder out. Nothing is written on error.
 Expected<RunOutcome> track_recording(const TrackRequest& request);

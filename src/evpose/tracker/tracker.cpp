@@ -269,7 +269,9 @@ Update Tracker::update(TimeNs t) {
   out.velocity = state.nav.velocity;
   out.gyro_bias = state.gyro_bias;
   out.accel_bias = state.accel_bias;
+  out.angular_rate = ekf_.angular_rate();
   out.covariance = covariance;
+  out.velocity_covariance = state.covariance.block<3, 3>(6, 6);
   out.accepted = evidence.accepted;
   out.events_read = static_cast<std::int32_t>(front_.counts().read - counted_.read);
   out.events_kept = static_cast<std::int32_t>(front_.counts().kept - counted_.kept);
@@ -287,7 +289,6 @@ Update Tracker::update(TimeNs t) {
 Tracker::Snapshot Tracker::snapshot(double decay_s) const {
   Snapshot out;
   const TimeSurface& surface = front_.surface();
-  const Pose T_map_body = ekf_.state().nav.T_map_body;
   const std::uint32_t now_us = front_.stamp(ekf_.state().t);
   out.size = setup_.camera->size();
   out.decay.reserve(static_cast<std::size_t>(surface.width()) * static_cast<std::size_t>(surface.height()));
@@ -299,13 +300,23 @@ Tracker::Snapshot Tracker::snapshot(double decay_s) const {
       const auto value = static_cast<float>(last == 0 ? 0 : std::exp(-age_s / decay_s));
       out.decay.push_back(on >= off ? value : -value);
     }
+  out.points = chosen_points(decay_s);
+  return out;
+}
+
+std::vector<Tracker::Snapshot::Point> Tracker::chosen_points(double decay_s) const {
+  std::vector<Snapshot::Point> out;
+  const TimeSurface& surface = front_.surface();
+  const Pose T_map_body = ekf_.state().nav.T_map_body;
+  const std::uint32_t now_us = front_.stamp(ekf_.state().t);
+  const ImageSize size = setup_.camera->size();
   const Pose T_cam_map = (T_map_body * setup_.T_body_cam).inverse();
   const double decay_us = 1e6 * decay_s;
   for (const std::uint32_t i : visible_.chosen()) {
     const auto pixel = setup_.camera->project(T_cam_map * setup_.map->position(i));
-    if (!pixel || !out.size.contains(*pixel)) continue;
+    if (!pixel || !size.contains(*pixel)) continue;
     const double field = sample_field(surface, *pixel, now_us, decay_us, FieldKernel::bilinear).value;
-    out.points.push_back({static_cast<float>(pixel->x()), static_cast<float>(pixel->y()), field >= 0.3679});
+    out.push_back({static_cast<float>(pixel->x()), static_cast<float>(pixel->y()), field >= 0.3679});
   }
   return out;
 }

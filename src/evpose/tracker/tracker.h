@@ -81,6 +81,8 @@ class Tracker {
     std::vector<Point> points;
   };
   Snapshot snapshot(double decay_s) const;
+  /// The points of a snapshot alone, which costs no pass over the image.
+  std::vector<Snapshot::Point> chosen_points(double decay_s) const;
 
  private:
   Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock);

@@ -28,10 +28,12 @@ struct StageTimes {
 struct Update {
   TimeNs t = 0;
   Pose T_map_body;
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    ///< of the body's origin, map frame, m/s
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< rad/s; without IMU: minus the angular rate
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< m/s^2
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< of the body's origin, map frame, m/s
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();     ///< rad/s; without IMU: minus the angular rate
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();    ///< m/s^2
+  Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();  ///< body frame, without its bias, rad/s
   Matrix6d covariance = Matrix6d::Zero();  ///< of T_map_body: (translation, rotation), m^2, rad^2
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< map frame, m^2/s^2
   Health health = Health::waiting;
   std::string reason;               ///< of the health, in words; set when it changed, else empty
   bool accepted = false;            ///< the registration passed the innovation gate and was used

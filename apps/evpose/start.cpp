@@ -65,7 +65,7 @@ Expected<StartState> from_text(const std::string& text_in, const Recording& reco
   return start;
 }
 
-void widen(const Recording& recording, EkfConfig* config) {
+void widen(const Recording& recording, FusionConfig* config) {
   if (recording.initial_pose) {
     config->start_position_sigma_m =
         std::max(config->start_position_sigma_m, recording.initial_pose->sigma_p_m);
@@ -80,7 +80,7 @@ void widen(const Recording& recording, EkfConfig* config) {
 }  // namespace
 
 Expected<StartState> choose_start(const std::string& init, const Recording& recording,
-                                  const std::vector<TimedPose>& truth, EkfConfig* config) {
+                                  const std::vector<TimedPose>& truth, FusionConfig* config) {
   if (init == "groundtruth" || (init == "auto" && !truth.empty())) {
     if (truth.empty())
       return Error{"--init groundtruth", "the recording has no ground truth",

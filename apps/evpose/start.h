@@ -17,6 +17,6 @@ namespace evpose {
 ///   FILE         a TUM trajectory of T_map_body, used like ground truth
 /// A pose without velocity widens the start's uncertainty in `config`.
 Expected<StartState> choose_start(const std::string& init, const Recording& recording,
-                                  const std::vector<TimedPose>& truth, EkfConfig* config);
+                                  const std::vector<TimedPose>& truth, FusionConfig* config);
 
 }  // namespace evpose

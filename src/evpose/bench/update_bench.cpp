@@ -32,9 +32,9 @@ void update(benchmark::State& state) {
   config.field = state.range(3) == 0 ? FieldKind::events : FieldKind::exponential;
   // The random load must not move the pose, nor its refusal open the gate; all stages run all the same.
   config.health.gate = -1;
-  config.ekf.cv_accel_density = config.ekf.cv_angular_density = 1e-3;
-  config.ekf.start_position_sigma_m = config.ekf.start_rotation_sigma_rad = 3e-4;
-  config.ekf.start_velocity_sigma_m_s = config.ekf.start_angular_rate_sigma_rad_s = 1e-3;
+  config.fusion.cv_accel_density = config.fusion.cv_angular_density = 1e-3;
+  config.fusion.start_position_sigma_m = config.fusion.start_rotation_sigma_rad = 3e-4;
+  config.fusion.start_velocity_sigma_m_s = config.fusion.start_angular_rate_sigma_rad_s = 1e-3;
   TrackerSetup setup;
   setup.camera = scene.camera;
   setup.motion = MotionModel::constant_velocity;

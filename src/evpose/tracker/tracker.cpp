@@ -44,7 +44,7 @@ void describe(ConfigTable& table, TrackerConfig& c) {
             "each event once against the moving contours, or the paper's temporal distance field");
   table.group("alignment", c.alignment);
   table.group("exponential", c.exponential);
-  table.group("ekf", c.ekf);
+  table.group("fusion", c.fusion);
   table.group("health", c.health);
 }
 
@@ -75,11 +75,11 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       index_(*setup_.map),
       visible_(index_, *setup_.camera, spread(config)),
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
-      ekf_(setup.motion, config.ekf, setup.imu_noise),
+      fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise)),
       health_(config.health),
       start_t_(start.t),
       alignment_(setup_.camera->size(), config.alignment) {
-  ekf_.start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
+  fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
   next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
 }
@@ -88,7 +88,7 @@ void Tracker::add_imu(const ImuSample& sample) {
   if (setup_.motion != MotionModel::imu) return;
   imu_.push_back(sample);
   // Before the start only the last sample matters.
-  while (imu_.size() >= 2 && imu_[1].t <= ekf_.state().t) imu_.pop_front();
+  while (imu_.size() >= 2 && imu_[1].t <= fusion_->state().t) imu_.pop_front();
   pump();
 }
 
@@ -133,19 +133,19 @@ void Tracker::consume(const EventPacket& packet, std::size_t* from) {
 }
 
 void Tracker::predict(TimeNs t) {
-  if (setup_.motion == MotionModel::constant_velocity) return ekf_.predict(t);
+  if (setup_.motion == MotionModel::constant_velocity) return fusion_->predict(t);
   // Make the first sample stand at the state's time, then step from sample to sample; the last step ends at
   // t.
-  const TimeNs from = ekf_.state().t;
+  const TimeNs from = fusion_->state().t;
   if (imu_.front().t > from) imu_.push_front({from, imu_.front().gyro, imu_.front().accel});
   while (imu_.size() >= 2 && imu_[1].t <= from) imu_.pop_front();
   if (imu_.front().t < from) imu_.front() = interpolate(imu_.front(), imu_[1], from);
   while (imu_[1].t < t) {
-    ekf_.predict(imu_[0], imu_[1]);
+    fusion_->predict(imu_[0], imu_[1]);
     imu_.pop_front();
   }
   const ImuSample last = interpolate(imu_[0], imu_[1], t);
-  ekf_.predict(imu_[0], last);
+  fusion_->predict(imu_[0], last);
   imu_.front() = last;
 }
 
@@ -153,13 +153,13 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
   const Pose T_body_cam = setup_.T_body_cam;
   const Eigen::Matrix3d R_body_map = T_map_body.rotation().transpose();
   const Eigen::Matrix3d R_cam_body = T_body_cam.rotation().transpose();
-  const Eigen::Vector3d rate_body = ekf_.angular_rate();
+  const Eigen::Vector3d rate_body = fusion_->state().angular_rate;
   // The pose half the span and the whole span ago, by the predicted twist.
   Pose T_cam_map[3];
   for (int k = 0; k < 3; ++k) {
     const double age = 0.5 * k * span_s;
     const Pose past{T_map_body.q * so3::exp(-age * rate_body),
-                    T_map_body.p - age * ekf_.state().nav.velocity};
+                    T_map_body.p - age * fusion_->state().nav.velocity};
     T_cam_map[k] = (past * T_body_cam).inverse();
   }
   const Eigen::Matrix3d R_cam_map = T_cam_map[0].rotation();
@@ -207,7 +207,7 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
 }
 
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
-  const Matrix6d covariance = ekf_.state().pose_covariance();
+  const Matrix6d covariance = fusion_->state().pose_covariance();
   if (config_.field == FieldKind::events) {
     const EventAlignmentResult r = alignment_.align(
         {front_.kept(), front_.stamp(t), span_s, to_seconds(t - start_t_), samples_, covariance});
@@ -235,10 +235,10 @@ std::string Tracker::refusal(const Registration& r, double innovation) const {
 Update Tracker::update(TimeNs t) {
   Update out;
   out.t = t;
-  const double span_s = to_seconds(t - ekf_.state().t);
+  const double span_s = to_seconds(t - fusion_->state().t);
   const double t0 = now();
   predict(t);
-  const Pose predicted = ekf_.state().nav.T_map_body;
+  const Pose predicted = fusion_->state().nav.T_map_body;
   const double t1 = now();
 
   const double flow_px_s = plan_points(predicted, span_s);
@@ -249,12 +249,12 @@ Update Tracker::update(TimeNs t) {
 
   Evidence evidence;
   evidence.t = t;
-  out.innovation = ekf_.innovation(stpe.measurement);
+  out.innovation = innovation(fusion_->state(), stpe.measurement);
   evidence.refused = refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
-  if (evidence.accepted) ekf_.update(stpe.measurement);  // eq. (5) for the newest state
+  if (evidence.accepted) fusion_->update(stpe.measurement);  // eq. (5) for the newest state
 
-  const Matrix6d covariance = ekf_.state().pose_covariance();
+  const Matrix6d covariance = fusion_->state().pose_covariance();
   const auto largest = [](const Eigen::Matrix3d& m) {
     return std::sqrt(
         std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
@@ -264,12 +264,12 @@ Update Tracker::update(TimeNs t) {
                                            largest(covariance.bottomRightCorner<3, 3>()));
   out.health = health_.judge(evidence, &out.reason);
 
-  const FusionState& state = ekf_.state();
+  const FusionState& state = fusion_->state();
   out.T_map_body = state.nav.T_map_body;
   out.velocity = state.nav.velocity;
   out.gyro_bias = state.gyro_bias;
   out.accel_bias = state.accel_bias;
-  out.angular_rate = ekf_.angular_rate();
+  out.angular_rate = fusion_->state().angular_rate;
   out.covariance = covariance;
   out.velocity_covariance = state.covariance.block<3, 3>(6, 6);
   out.accepted = evidence.accepted;
@@ -289,7 +289,7 @@ Update Tracker::update(TimeNs t) {
 Tracker::Snapshot Tracker::snapshot(double decay_s) const {
   Snapshot out;
   const TimeSurface& surface = front_.surface();
-  const std::uint32_t now_us = front_.stamp(ekf_.state().t);
+  const std::uint32_t now_us = front_.stamp(fusion_->state().t);
   out.size = setup_.camera->size();
   out.decay.reserve(static_cast<std::size_t>(surface.width()) * static_cast<std::size_t>(surface.height()));
   for (int y = 0; y < surface.height(); ++y)
@@ -307,8 +307,8 @@ Tracker::Snapshot Tracker::snapshot(double decay_s) const {
 std::vector<Tracker::Snapshot::Point> Tracker::chosen_points(double decay_s) const {
   std::vector<Snapshot::Point> out;
   const TimeSurface& surface = front_.surface();
-  const Pose T_map_body = ekf_.state().nav.T_map_body;
-  const std::uint32_t now_us = front_.stamp(ekf_.state().t);
+  const Pose T_map_body = fusion_->state().nav.T_map_body;
+  const std::uint32_t now_us = front_.stamp(fusion_->state().t);
   const ImageSize size = setup_.camera->size();
   const Pose T_cam_map = (T_map_body * setup_.T_body_cam).inverse();
   const double decay_us = 1e6 * decay_s;

@@ -11,7 +11,7 @@
 #include "evpose/core/error.h"
 #include "evpose/core/parallel.h"
 #include "evpose/event/event_front.h"
-#include "evpose/fusion/ekf.h"
+#include "evpose/fusion/back_end.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/event_alignment.h"
 #include "evpose/registration/registration.h"
@@ -28,7 +28,7 @@ struct TrackerConfig {
   FieldKind field = FieldKind::events;
   EventAlignmentConfig alignment;  ///< of field == events
   RegistrationConfig exponential;  ///< of field == exponential
-  EkfConfig ekf;
+  FusionConfig fusion;
   HealthConfig health;
 };
 void describe(ConfigTable& table, TrackerConfig& config);
@@ -112,7 +112,7 @@ class Tracker {
   ContourIndex index_;
   VisibleSet visible_;
   EventFront front_;
-  Ekf ekf_;
+  std::unique_ptr<BackEnd> fusion_;
   HealthMonitor health_;
   std::function<void(const Update&)> callback_;
 

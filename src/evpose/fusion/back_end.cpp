@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/fusion/back_end.h"
+
+#include "evpose/core/config.h"
+#include "evpose/core/error.h"
+#include "evpose/fusion/ekf.h"
+
+namespace evpose {
+
+void describe(ConfigTable& table, FusionConfig& c) {
+  table.add("kind", c.kind, {{"ekf", BackEndKind::ekf}},
+            "framework of the fusion: error-state Kalman filter");
+  table.add("gravity_x", c.gravity_map.x(), "m/s^2", "gravity in the map frame", {-20, 20});
+  table.add("gravity_y", c.gravity_map.y(), "m/s^2", "gravity in the map frame", {-20, 20});
+  table.add("gravity_z", c.gravity_map.z(), "m/s^2", "gravity in the map frame", {-20, 20});
+  table.add("imu_noise_scale", c.imu_noise_scale, "", "factor on the IMU's noise densities", {0.01, 1000});
+  table.add("cv_accel_density", c.cv_accel_density, "m/s^2/sqrt(Hz)", "without IMU: white acceleration",
+            {1e-6, 1e6});
+  table.add("cv_angular_density", c.cv_angular_density, "rad/s^2/sqrt(Hz)",
+            "without IMU: white angular acceleration", {1e-6, 1e6});
+  table.add("start_position_sigma_m", c.start_position_sigma_m, "m", "error of the start position, 1 sigma",
+            {1e-6, 10});
+  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad",
+            "error of the start attitude, 1 sigma", {1e-6, 1});
+  table.add("start_velocity_sigma_m_s", c.start_velocity_sigma_m_s, "m/s",
+            "error of the start velocity, 1 sigma", {1e-6, 100});
+  table.add("start_gyro_bias_sigma_rad_s", c.start_gyro_bias_sigma_rad_s, "rad/s",
+            "gyroscope bias at the start, 1 sigma", {1e-6, 10});
+  table.add("start_accel_bias_sigma_m_s2", c.start_accel_bias_sigma_m_s2, "m/s^2",
+            "accelerometer bias at the start, 1 sigma", {1e-6, 10});
+  table.add("start_angular_rate_sigma_rad_s", c.start_angular_rate_sigma_rad_s, "rad/s",
+            "without IMU: error of the start's angular rate, 1 sigma", {1e-6, 10});
+}
+
+std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise) {
+  const Motion motion(model, config, noise);
+  switch (config.kind) {
+    case BackEndKind::ekf:
+      return std::make_unique<Ekf>(motion);
+  }
+  EVPOSE_CHECK(false);
+  return nullptr;
+}
+
+}  // namespace evpose

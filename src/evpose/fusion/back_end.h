@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "evpose/fusion/motion.h"
+#include "evpose/fusion/state.h"
+#include "evpose/imu/imu.h"
+
+namespace evpose {
+
+class ConfigTable;
+
+/// Framework that fuses prediction (EV-Pose eq. 2, 4) and pose measurements (eq. 3).
+enum class BackEndKind { ekf };
+
+struct FusionConfig {
+  BackEndKind kind = BackEndKind::ekf;
+  Eigen::Vector3d gravity_map{0, 0, -9.81};  ///< m/s^2
+  double imu_noise_scale =
+      1.5;  ///< on the densities of imu.yaml: calibrations are made at rest, drones vibrate
+  double cv_accel_density = 1.5;    ///< constant velocity: white acceleration, m/s^2/sqrt(Hz); about 6 m/s^2
+                                    ///< that keep up for 50 ms. More only opens the gate to clutter.
+  double cv_angular_density = 1.5;  ///< ... white angular acceleration, rad/s^2/sqrt(Hz), likewise
+  double start_position_sigma_m = 2e-3;
+  double start_rotation_sigma_rad = 2e-3;
+  double start_velocity_sigma_m_s = 0.05;
+  double start_gyro_bias_sigma_rad_s = 0.02;
+  double start_accel_bias_sigma_m_s2 = 0.1;
+  double start_angular_rate_sigma_rad_s = 0.2;  ///< constant velocity only
+};
+void describe(ConfigTable& table, FusionConfig& config);
+
+/// What the tracker asks of a fusion framework. Time goes forward: start, then predict and update in turn.
+class BackEnd {
+ public:
+  explicit BackEnd(const Motion& motion) : motion_(motion) {}
+  virtual ~BackEnd() = default;
+
+  /// `angular_rate_body` is used by constant velocity only.
+  virtual void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) = 0;
+  /// IMU model: one step between two samples; a.t must be the state's time. Both in the body frame.
+  virtual void predict(const ImuSample& a, const ImuSample& b) = 0;
+  /// Constant velocity: to time t >= the state's.
+  virtual void predict(TimeNs t) = 0;
+  /// Measurement at the state's time, relative to state().nav.T_map_body, as registration returns it.
+  virtual void update(const PoseInformation& measurement) = 0;
+  /// The newest state, with its covariance. A copy can be carried to any later time by motion().
+  virtual const FusionState& state() const = 0;
+
+  const Motion& motion() const { return motion_; }
+
+ private:
+  Motion motion_;
+};
+
+std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise);
+
+}  // namespace evpose

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "evpose/fusion/state.h"
+#include "evpose/imu/imu.h"
+
+namespace evpose {
+
+struct FusionConfig;
+
+/// Carries a state and its covariance forward, by the IMU or by constant velocity (EV-Pose eq. 2). Without
+/// an IMU it is the same model on a gyroscope that reads zero: its "bias" is then minus the angular rate.
+class Motion {
+ public:
+  Motion(MotionModel model, const FusionConfig& config, const ImuNoise& noise);
+
+  MotionModel model() const { return model_; }
+  const Eigen::Vector3d& gravity_map() const { return gravity_map_; }
+  /// Densities in use: the IMU's times the configured scale.
+  const ImuNoise& noise() const { return noise_; }
+
+  /// The state at the start, with its configured uncertainty. The rate is used by constant velocity only.
+  FusionState start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const;
+
+  /// IMU model: one step between two samples in the body frame; a.t must be the state's time.
+  void step(FusionState& state, const ImuSample& a, const ImuSample& b) const;
+  /// Constant velocity: to time t >= the state's.
+  void step(FusionState& state, TimeNs t) const;
+
+ private:
+  void spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
+              const Eigen::Vector3d& force, double dt_s) const;
+
+  MotionModel model_;
+  Eigen::Vector3d gravity_map_;
+  ImuNoise noise_;
+  Vector15d start_sigma_;
+};
+
+}  // namespace evpose

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+#include "evpose/imu/strapdown.h"
+
+namespace evpose {
+
+using Matrix15d = Eigen::Matrix<double, 15, 15>;
+using Vector15d = Eigen::Matrix<double, 15, 1>;
+
+/// How the state moves between measurements.
+enum class MotionModel { imu, constant_velocity };
+
+/// Where the blocks of a 15-state error begin: (p, phi, v, b_g, b_a), perturbed as Pose::plus.
+namespace error_state {
+inline constexpr int kP = 0, kPhi = 3, kV = 6, kBg = 9, kBa = 12;
+}
+
+/// State of the fusion at one time.
+struct FusionState {
+  TimeNs t = 0;
+  NavState nav;
+  Eigen::Vector3d gyro_bias =
+      Eigen::Vector3d::Zero();  ///< rad/s; constant velocity: minus the body's angular rate
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();    ///< m/s^2; unused under constant velocity
+  Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();  ///< of the body, rad/s, at the last prediction
+  Matrix15d covariance = Matrix15d::Zero();
+
+  Matrix6d pose_covariance() const { return covariance.topLeftCorner<6, 6>(); }
+
+  /// Adds an error; the covariance stays as it is.
+  void add(const Vector15d& d);
+  /// The error d with other.add(d) == *this.
+  Vector15d minus(const FusionState& other) const;
+};
+
+/// A pose measurement in information form, linearised at the predicted pose: near it the measurement's cost
+/// is d^T information d / 2 - vector^T d, with d as in Pose::plus. The information may be singular.
+struct PoseInformation {
+  Matrix6d information = Matrix6d::Zero();
+  Vector6d vector = Vector6d::Zero();
+};
+
+/// Normalised innovation squared of a measurement at the state's pose, divided by its rank: about 1 when
+/// both know how good they are.
+double innovation(const FusionState& state, const PoseInformation& measurement);
+
+}  // namespace evpose

@@ -16,17 +16,18 @@ MAP = SENSORS | {"map"}
 SOLVERS = MAP | {"registration", "fusion"}
 TRACKER = SOLVERS | {"tracker"}
 IO = MAP | {"io"}
-ALL = TRACKER | IO | {"map_build", "sim", "eval", "report", "live", "bench"}
+ALL = TRACKER | IO | {"map_build", "sim", "eval", "report", "mavlink", "serve", "view", "bench"}
 MAY_SEE = {
     "core": set(), "camera": CORE, "imu": CORE, "event": CORE, "map": SENSORS,
     "registration": MAP, "fusion": MAP, "tracker": SOLVERS,
     "io": MAP, "map_build": IO, "sim": IO, "eval": IO,
-    "report": ALL, "live": ALL, "bench": ALL, "apps": ALL,
+    "mavlink": TRACKER, "serve": TRACKER | IO | {"mavlink"}, "view": TRACKER | IO | {"report"},
+    "report": ALL, "bench": ALL, "apps": ALL,
 }
 EMBEDDABLE = TRACKER
 
 # Headers of outside libraries, and who may use them.
-FORMATS = {"io", "report", "live", "bench", "apps"}
+FORMATS = {"io", "report", "view", "bench", "apps"}
 OUTSIDE = [
     ("Ceres", r"ceres/|glog/", {"registration", "fusion"}),
     ("yaml-cpp", r"yaml-cpp/", FORMATS),
@@ -37,6 +38,7 @@ OUTSIDE = [
     ("SQLite", r"sqlite3\.h", {"io"}),
     ("Embree", r"embree3/", {"sim"}),
     ("assimp", r"assimp/", {"sim"}),
+    ("Boost", r"boost/", {"view"}),
     ("CLI11", r"CLI/", {"apps"}),
 ]
 # Opening files and printing.

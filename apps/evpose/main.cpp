@@ -30,6 +30,8 @@ int run_program(int argc, char** argv) {
   add_map(app, run);
   add_info(app, run);
   add_convert(app, run);
+  add_serve(app, run);
+  add_mavlink(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

@@ -25,21 +25,6 @@ constexpr std::size_t kUnitCheckSamples = 20'000;  // of the IMU, looked at befo
 constexpr std::size_t kDrawnMapPoints = 20'000;    // handed to the report
 constexpr double kOverlayDecay_s = 0.02;
 
-Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
-                                                     const Recording& recording) {
-  std::string path = request.map;
-  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
-  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
-  auto map = read_contour_map(path);
-  if (!map) return map.error();
-  if (!request.occluders.empty()) {
-    auto mesh = read_ply_mesh(request.occluders, map->anchor);
-    if (!mesh) return mesh.error();
-    map->occluders = std::move(*mesh);
-  }
-  return std::make_shared<const ContourMap>(std::move(*map));
-}
-
 /// Looks at the first seconds of the IMU before anything is made of them.
 Status check_units(const Recording& recording, const std::vector<TimedPose>& truth) {
   auto imu = open_imu(recording);
@@ -125,6 +110,21 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
   for (const auto& assignment : request.assignments)
     if (auto ok = apply_assignment(table, assignment); !ok) return ok.error();
   return config;
+}
+
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
+                                                     const Recording& recording) {
+  std::string path = request.map;
+  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
+  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
+  auto map = read_contour_map(path);
+  if (!map) return map.error();
+  if (!request.occluders.empty()) {
+    auto mesh = read_ply_mesh(request.occluders, map->anchor);
+    if (!mesh) return mesh.error();
+    map->occluders = std::move(*mesh);
+  }
+  return std::make_shared<const ContourMap>(std::move(*map));
 }
 
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config) {

@@ -44,6 +44,8 @@ struct TrackJob {
   StartState start;
   TrackerSetup setup;
 };
+/// The map of the request, or the recording's own.
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request, const Recording& recording);
 /// Reads and checks everything but the events.
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
 /// What the run folder is told at the end; without times and memory.

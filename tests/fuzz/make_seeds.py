@@ -200,7 +200,27 @@ CALIBRATIONS = [
     "199.09 198.82 132.19 110.71 -0.3684 0.1509 -0.0002961 -0.000759 0.0\n",
 ]
 
+
+
+def mavlink():
+    """A published heartbeat, cut by the first byte into pieces of ten."""
+    heartbeat = bytes.fromhex("fd090000072ac500000000000000120800040388 92".replace(" ", ""))
+    return b"\x09" + heartbeat + b"\xfd\x00" + heartbeat
+
+
+def live_packets():
+    def packet(kind, number, base, payload):
+        return struct.pack("<IB3xIIq", 0x31505645, kind, number, len(payload), base) + payload
+
+    events = b"".join(struct.pack("<IHH", 5 * i, 3 * i, 2 * i | (i & 1) << 15) for i in range(20))
+    words = struct.pack(f"<{len(evt3_words())}H", *evt3_words())
+    return (b"\x30" + packet(1, 0, 1000, events) + packet(2, 1, 2000, struct.pack("<q6d", 2000, *range(6))) +
+            packet(3, 2, 0, words))
+
+
 SEEDS = {
+    "mavlink": [mavlink],
+    "live_packets": [live_packets, lambda: live_packets()[:190], lambda: b"\xff" + live_packets()[1:]],
     "calibrations": [lambda text=text: text.encode() for text in CALIBRATIONS],
     "events_raw": [evt2, lambda: evt21("legacy"), lambda: evt21("little"), evt3],
     "events_dat": [lambda: dat(1), lambda: dat(2), lambda: dat(2, 0x0E)],

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "commands.h"
+#include "serve_live.h"
+
+namespace evpose {
+namespace {
+
+int dump_config(const ServeRequest& request) {
+  auto config = load_serve_config(request.track);
+  if (!config) return bad_input(config.error());
+  ConfigTable table;
+  describe(table, *config);
+  std::fputs(table.to_yaml().c_str(), stdout);
+  return 0;
+}
+
+int run_serve(const ServeRequest& request) {
+  const auto status = serve(request);
+  return status ? *status : bad_input(status.error());
+}
+
+}  // namespace
+
+void add_serve(CLI::App& app, std::function<int()>& run) {
+  auto* command = app.add_subcommand(
+      "serve", "Track a live stream, or a recording as if it were one, and hand the pose on (docs/live.md)");
+  auto request = std::make_shared<ServeRequest>();
+  auto dump = std::make_shared<bool>(false);
+  auto speed = std::make_shared<double>(1);
+  TrackRequest& track = request->track;
+  auto* source =
+      command->add_option("source", track.recording,
+                          "a recording; or udp://HOST:PORT, tcp://HOST:PORT, where a camera's driver "
+                          "sends packets");
+  command->add_option("--map", track.map, "contours (PLY, PCD, map.h5); default: the recording's own");
+  command->add_option("--calibration", track.calibration, "calibration of any kind that evpose info knows");
+  command->add_option("--imu-model", request->imu_model,
+                      "of a source: the IMU's noise, as Kalibr's imu.yaml");
+  command->add_option("--occluders", track.occluders, "PLY mesh that hides contours behind it");
+  command->add_option("--init", track.init, "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
+  command->add_option("--mavlink", request->mavlink,
+                      "to an autopilot: udp://HOST:PORT, udpin://HOST:PORT or serial:///dev/ttyX:BAUD");
+  auto* speed_option = command->add_option(
+      "--speed", *speed, "of a recording against the wall clock; 0: as fast as it is tracked, nothing shed");
+  command->add_option("-o,--output", track.output, "run folder; default: none is written");
+  command->add_option("--config", track.config_file, "YAML file with settings");
+  command->add_option("--set", track.assignments, "one setting, key=value")->allow_extra_args(false);
+  command->add_flag("--dump-config", *dump, "print all settings and stop");
+  command->callback([=, &run] {
+    if (!*dump && source->count() == 0) throw CLI::RequiredError(source->get_name());
+    if (speed_option->count() > 0) {
+      request->track.assignments.push_back("replay.speed=" + std::to_string(*speed));
+      if (*speed == 0) request->track.assignments.emplace_back("queue.shed=false");
+    }
+    run = [=] { return *dump ? dump_config(*request) : run_serve(*request); };
+  });
+}
+
+}  // namespace evpose

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "evpose/core/error.h"
+#include "evpose/serve/stream_queue.h"
+#include "evpose/tracker/tracker.h"
+
+namespace evpose {
+
+class ConfigTable;
+
+struct SessionConfig {
+  double stall_s = 0.3;        ///< of the wall clock without data: the stream is called stalled
+  double largest_gap_s = 0.3;  ///< of data time without events or IMU: the tracker starts anew
+  double wait_imu_s = 0.1;     ///< events further ahead of the IMU are shed
+};
+void describe(ConfigTable& table, SessionConfig& config);
+
+/// Runs trackers on a live stream: starts one, feeds it with what is sound, and starts another from the last
+/// good pose when a clock jumps or a stream was away too long. Memory is bounded whatever arrives. `now_ns`
+/// is the machine's monotone clock.
+class Session {
+ public:
+  /// `again`: not the first start, so that the pose is uncertain.
+  using MakeTracker = std::function<Expected<std::unique_ptr<Tracker>>(const StartState& start, bool again)>;
+  struct Hooks {
+    std::function<void(const Update&, TimeNs data_to_monotonic)> update;
+    std::function<void(const std::string& why)> restarted;  ///< a new tracker stands somewhere else
+    std::function<void(const std::string& what)> stalled;   ///< no pose until the next update
+    std::function<void(const std::string& words)> notice;
+  };
+
+  /// `start_at`: the data time of the start pose; unset: as soon as there are data.
+  Session(const SessionConfig& config, bool has_imu, const StartState& start, std::optional<TimeNs> start_at,
+          MakeTracker make, Hooks hooks);
+
+  void take(StreamItem& item, TimeNs now_ns);
+  /// Call at least ten times a second.
+  void tick(TimeNs now_ns);
+  /// Back to the start pose.
+  void reset(const std::string& why);
+
+  const Tracker* tracker() const { return tracker_.get(); }
+  struct Counts {
+    std::uint64_t updates = 0, restarts = 0, stalls = 0;
+    std::uint64_t events = 0, events_shed = 0, events_late = 0, imu = 0, imu_late = 0;
+    std::uint64_t events_kept = 0;  ///< by the noise filters of all trackers so far
+  };
+  const Counts& counts() const { return counts_; }
+
+ private:
+  struct Stream {
+    const char* name;
+    TimeNs last = std::numeric_limits<TimeNs>::min();  ///< data time
+    TimeNs arrived = 0;                                ///< monotone clock
+    bool stalled = false;
+    bool any() const { return last != std::numeric_limits<TimeNs>::min(); }
+  };
+  void take_events(EventPacket& packet, TimeNs now_ns);
+  void take_imu(const std::vector<ImuSample>& samples, TimeNs now_ns);
+  /// Whether data of time `t` follow; if the clock jumped, the tracker is given up first.
+  bool follows(Stream& stream, TimeNs t);
+  void arrived(Stream& stream, TimeNs now_ns);
+  void check_stall(Stream& stream, TimeNs now_ns);
+  void restart(const std::string& why, bool from_last);
+  bool begin(TimeNs first_event);
+  bool create(const StartState& start);
+  void learn_offset(const StreamItem& item, TimeNs newest);
+
+  SessionConfig config_;
+  bool has_imu_;
+  StartState start_, next_;
+  bool again_ = false;
+  std::optional<TimeNs> first_start_at_, start_at_;
+  MakeTracker make_;
+  Hooks hooks_;
+  std::unique_ptr<Tracker> tracker_;
+  Stream events_{"events"}, imu_{"IMU"};
+  std::deque<ImuSample> before_;  ///< IMU samples that came before there was a tracker
+  std::optional<Update> last_valid_;
+  bool shedding_ = false, refused_ = false;
+  TimeNs offset_ = 0, window_min_ = 0, window_end_ = std::numeric_limits<TimeNs>::min();
+  bool has_offset_ = false;
+  Counts counts_;
+};
+
+}  // namespace evpose

@@ -11,6 +11,7 @@ find_package(BZip2 REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(embree 3.12 REQUIRED)
 find_package(assimp REQUIRED)
+find_package(Boost 1.74 REQUIRED)  # headers alone
 foreach(library lz4 zstd blosc)  # no CMake packages in Debian 12
   find_path(EVPOSE_${library}_INCLUDE ${library}.h REQUIRED)
   find_library(EVPOSE_${library}_LIBRARY ${library} REQUIRED)

@@ -31,6 +31,7 @@ int run_program(int argc, char** argv) {
   add_info(app, run);
   add_convert(app, run);
   add_serve(app, run);
+  add_view(app, run);
   add_mavlink(app, run);
   try {
     app.parse(argc, argv);

@@ -44,6 +44,12 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   command->add_option("--init", track.init, "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
   command->add_option("--mavlink", request->mavlink,
                       "to an autopilot: udp://HOST:PORT, udpin://HOST:PORT or serial:///dev/ttyX:BAUD");
+  auto port = std::make_shared<int>(8088);
+  auto* view_option =
+      command->add_option("--view", *port, "show it in a browser, at this port of this machine")
+          ->expected(0, 1)
+          ->check(CLI::Range(0, 65535))
+          ->default_str("8088");
   auto* speed_option = command->add_option(
       "--speed", *speed, "of a recording against the wall clock; 0: as fast as it is tracked, nothing shed");
   command->add_option("-o,--output", track.output, "run folder; default: none is written");
@@ -52,6 +58,7 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   command->add_flag("--dump-config", *dump, "print all settings and stop");
   command->callback([=, &run] {
     if (!*dump && source->count() == 0) throw CLI::RequiredError(source->get_name());
+    if (view_option->count() > 0) request->view = *port;
     if (speed_option->count() > 0) {
       request->track.assignments.push_back("replay.speed=" + std::to_string(*speed));
       if (*speed == 0) request->track.assignments.emplace_back("queue.shed=false");

@@ -15,6 +15,7 @@
 #include "evpose/io/kalibr.h"
 #include "evpose/mavlink/link.h"
 #include "evpose/serve/packet_source.h"
+#include "evpose/view/viewer.h"
 #include "interrupt.h"
 #include "start.h"
 
@@ -28,8 +29,6 @@ constexpr double kAgainSpeed_m_s = 0.5;
 
 volatile std::sig_atomic_t g_reset = 0;
 void ask_reset(int) { g_reset = 1; }
-
-void say(const std::string& words) { log_warning(words); }
 
 /// How long after its instant each pose was on the socket, to a hundredth of a millisecond.
 class Delays {
@@ -110,7 +109,13 @@ class Outputs {
   Outputs(const ServeConfig& config, const TrackJob& job)
       : frames_(vehicle_frames(config.frames, job.recording)) {}
 
-  Status open(const ServeRequest& request, const ServeConfig& config) {
+  Status open(const ServeRequest& request, const ServeConfig& config, const TrackJob& job) {
+    if (request.view >= 0) {
+      auto viewer = Viewer::start({config.view_address, request.view}, job.recording.name, job.map);
+      if (!viewer) return viewer.error();
+      viewer_ = std::move(*viewer);
+      std::fprintf(stderr, "evpose: open %s in a browser\n", viewer_->address().c_str());
+    }
     if (!request.mavlink.empty()) {
       auto link = mavlink::Link::open(request.mavlink);
       if (!link) return link.error();
@@ -126,9 +131,11 @@ class Outputs {
     return {};
   }
 
-  void add(const Update& u, TimeNs data_to_monotonic) {
+  void add(const Update& u, TimeNs data_to_monotonic, const Tracker& tracker) {
     if (reporter_) reporter_->add(u, data_to_monotonic);
-    delays_.add(monotonic_ns() - (u.t + data_to_monotonic));
+    const TimeNs delay = monotonic_ns() - (u.t + data_to_monotonic);
+    delays_.add(delay);
+    if (viewer_) viewer_->add(u, tracker, 1e3 * to_seconds(delay));
     health_ = u.health;
     if (!u.reason.empty()) log_detail(text(to_string(u.health), ": ", u.reason));
     if (run_ && u.t > recorded_until_) run_->add(u);
@@ -136,6 +143,10 @@ class Outputs {
   }
   void restarted(const std::string& why) {
     if (reporter_) reporter_->restarted(why);
+  }
+  void notice(const std::string& words) {
+    log_warning(words);
+    if (viewer_) viewer_->notice(words);
   }
   void stalled(const std::string& what) {
     if (reporter_) reporter_->stalled(what);
@@ -148,7 +159,7 @@ class Outputs {
       reporter_->receive(bytes, monotonic_ns());
     }
     reporter_->tick(now_ns);
-    if (const std::string notice = link_->take_notice(); !notice.empty()) say(notice);
+    if (const std::string words = link_->take_notice(); !words.empty()) notice(words);
   }
 
   Health health() const { return health_; }
@@ -161,6 +172,7 @@ class Outputs {
   std::unique_ptr<mavlink::Link> link_;
   std::unique_ptr<mavlink::Reporter> reporter_;
   std::unique_ptr<RunFolder> run_;
+  std::unique_ptr<Viewer> viewer_;
   TimeNs recorded_until_ = std::numeric_limits<TimeNs>::min();
   Health health_ = Health::waiting;
   Delays delays_;
@@ -243,6 +255,8 @@ void describe(ConfigTable& table, ServeConfig& c) {
   table.group("session", c.session);
   table.group("mavlink", c.mavlink);
   table.group("frames", c.frames);
+  table.add("view_address", c.view_address,
+            "address that the viewer is bound to; not loopback: anybody on the network may look");
 }
 
 Expected<ServeConfig> load_serve_config(const TrackRequest& request) {
@@ -282,13 +296,15 @@ Expected<int> serve(const ServeRequest& request) {
   };
   if (const auto possible = make(job->start, false); !possible) return possible.error();
   Outputs outputs(*config, *job);
-  if (auto ok = outputs.open(request, *config); !ok) return ok.error();
+  if (auto ok = outputs.open(request, *config, *job); !ok) return ok.error();
 
-  Session session(config->session, job->recording.has_imu, job->start,
-                  live ? std::nullopt : std::optional(job->start.t), make,
-                  {[&](const Update& u, TimeNs offset) { outputs.add(u, offset); },
-                   [&](const std::string& why) { outputs.restarted(why); },
-                   [&](const std::string& what) { outputs.stalled(what); }, say});
+  Session session(
+      config->session, job->recording.has_imu, job->start, live ? std::nullopt : std::optional(job->start.t),
+      make,
+      {[&](const Update& u, TimeNs offset, const Tracker& tracker) { outputs.add(u, offset, tracker); },
+       [&](const std::string& why) { outputs.restarted(why); },
+       [&](const std::string& what) { outputs.stalled(what); },
+       [&](const std::string& words) { outputs.notice(words); }});
   StreamQueue queue(config->queue);
   const InterruptGuard guard;
   std::signal(SIGHUP, ask_reset);

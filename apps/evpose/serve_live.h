@@ -25,6 +25,7 @@ struct ServeConfig {
   SessionConfig session;
   MavlinkConfig mavlink;
   FramesConfig frames;
+  std::string view_address = "127.0.0.1";
 };
 void describe(ConfigTable& table, ServeConfig& config);
 
@@ -32,6 +33,7 @@ struct ServeRequest {
   TrackRequest track;     ///< recording: a recording, or the address of a source; output may be empty
   std::string imu_model;  ///< of a source: file with the IMU's noise
   std::string mavlink;    ///< address of a link; empty: none
+  int view = -1;          ///< port of the viewer; -1: none
 };
 
 Expected<ServeConfig> load_serve_config(const TrackRequest& request);

@@ -265,7 +265,7 @@ class SessionStory : public testing::Test {
               again_.push_back(again);
               return Tracker::create(setup_, {}, start);
             },
-            {[this](const Update& u, TimeNs offset) {
+            {[this](const Update& u, TimeNs offset, const Tracker&) {
                updates_.push_back(u.t);
                offset_ = offset;
              },

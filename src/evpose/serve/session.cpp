@@ -163,7 +163,7 @@ bool Session::create(const StartState& start) {
   tracker_->on_update([this](const Update& u) {
     ++counts_.updates;
     if (u.health == Health::tracking || u.health == Health::degraded) last_valid_ = u;
-    hooks_.update(u, offset_);
+    hooks_.update(u, offset_, *tracker_);
   });
   for (const ImuSample& sample : before_) tracker_->add_imu(sample);
   before_.clear();

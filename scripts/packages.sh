@@ -22,6 +22,7 @@ build=(
   libsqlite3-dev       # ROS 2 bags
   libembree-dev        # ray casting in the simulator
   libassimp-dev        # meshes for the simulator
+  libboost-dev         # the viewer's server
   nodejs npm           # fetch the report's plot library, once, while building
   ca-certificates      # for npm's https
 )
@@ -32,6 +33,11 @@ test=(
   python3-numpy        # the independent scorer
   python3-h5py         # makes broken recordings, reads our maps
   python3-rosbag       # reads our ROS bags
+  python3-dev pybind11-dev  # the Python module
+  pkg-config libroscpp-dev libtf2-ros-dev libtopic-tools-dev libsensor-msgs-dev libnav-msgs-dev libgeometry-msgs-dev
+  libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev  # the ROS node
+  python3-rosmaster python3-rospy python3-sensor-msgs python3-nav-msgs python3-geometry-msgs python3-diagnostic-msgs
+  python3-tf2-msgs     # drive it
   clang-14 libclang-rt-14-dev  # fuzzing
   chromium             # draws the report
   clang-format-14      # pinned: each version formats differently

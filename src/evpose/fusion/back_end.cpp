@@ -4,6 +4,8 @@
 #include "evpose/core/config.h"
 #include "evpose/core/error.h"
 #include "evpose/fusion/ekf.h"
+#include "evpose/fusion/graph.h"
+#include "evpose/fusion/particle_filter.h"
 
 namespace evpose {
 
@@ -30,6 +32,8 @@ void describe(ConfigTable& table, FusionConfig& c) {
             "accelerometer bias at the start, 1 sigma", {1e-6, 10});
   table.add("start_angular_rate_sigma_rad_s", c.start_angular_rate_sigma_rad_s, "rad/s",
             "without IMU: error of the start's angular rate, 1 sigma", {1e-6, 10});
+  table.group("window", c.window);
+  table.group("particle", c.particle);
 }
 
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise) {
@@ -37,6 +41,10 @@ std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& co
   switch (config.kind) {
     case BackEndKind::ekf:
       return std::make_unique<Ekf>(motion);
+    case BackEndKind::graph:
+      return std::make_unique<Graph>(motion, config.window);
+    case BackEndKind::particle:
+      return std::make_unique<ParticleFilter>(motion, config.particle);
   }
   EVPOSE_CHECK(false);
   return nullptr;

@@ -13,7 +13,22 @@ namespace evpose {
 class ConfigTable;
 
 /// Framework that fuses prediction (EV-Pose eq. 2, 4) and pose measurements (eq. 3).
-enum class BackEndKind { ekf };
+enum class BackEndKind { ekf, graph, particle };
+
+/// Of BackEndKind::graph.
+struct WindowConfig {
+  double length_s = 0.1;   ///< states older than this are marginalised
+  int optimise_every = 10;  ///< updates
+  int iterations = 2;
+};
+void describe(ConfigTable& table, WindowConfig& config);
+
+/// Of BackEndKind::particle.
+struct ParticleConfig {
+  int particles = 500;
+  double resample_below = 0.5;  ///< share of effective particles
+};
+void describe(ConfigTable& table, ParticleConfig& config);
 
 struct FusionConfig {
   BackEndKind kind = BackEndKind::ekf;
@@ -29,6 +44,8 @@ struct FusionConfig {
   double start_gyro_bias_sigma_rad_s = 0.02;
   double start_accel_bias_sigma_m_s2 = 0.1;
   double start_angular_rate_sigma_rad_s = 0.2;  ///< constant velocity only
+  WindowConfig window;
+  ParticleConfig particle;
 };
 void describe(ConfigTable& table, FusionConfig& config);
 

@@ -5,6 +5,9 @@
 
 namespace evpose {
 
+/// Kalman update of the state at its own time by a measurement relative to its pose (EV-Pose eq. 5).
+void correct(FusionState& state, const PoseInformation& measurement);
+
 /// Error-state Kalman filter on T_map_body, velocity and IMU biases: the fusion of prediction (EV-Pose eq. 2,
 /// 4) and pose measurement (eq. 3, 5) for one newest state.
 class Ekf : public BackEnd {
@@ -16,7 +19,7 @@ class Ekf : public BackEnd {
   }
   void predict(const ImuSample& a, const ImuSample& b) override { motion().step(state_, a, b); }
   void predict(TimeNs t) override { motion().step(state_, t); }
-  void update(const PoseInformation& measurement) override;
+  void update(const PoseInformation& measurement) override { correct(state_, measurement); }
   const FusionState& state() const override { return state_; }
 
  private:

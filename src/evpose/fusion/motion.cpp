@@ -3,6 +3,7 @@
 
 #include "evpose/core/error.h"
 #include "evpose/fusion/back_end.h"
+#include "evpose/fusion/preintegration.h"
 
 namespace evpose {
 
@@ -22,6 +23,7 @@ Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
     noise_.gyro_walk = c.cv_angular_density;
     noise_.accel_density = c.cv_accel_density;
     noise_.accel_walk = 0;
+    gravity_map_.setZero();
     gyro_sigma = c.start_angular_rate_sigma_rad_s;
     accel_sigma = 0;
   }
@@ -61,18 +63,7 @@ void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vec
     F.block<3, 3>(kP, kBa) = -0.5 * dt * dt * R;
   }
 
-  const auto square = [](double density) { return density * density; };
-  Matrix15d Q = Matrix15d::Zero();
-  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  const double qa = square(noise_.accel_density), qg = square(noise_.gyro_walk);
-  Q.block<3, 3>(kV, kV) = qa * dt * I;
-  Q.block<3, 3>(kP, kV) = Q.block<3, 3>(kV, kP) = 0.5 * qa * dt * dt * I;
-  Q.block<3, 3>(kP, kP) = qa * dt * dt * dt / 3 * I;
-  Q.block<3, 3>(kPhi, kPhi) = (square(noise_.gyro_density) * dt + qg * dt * dt * dt / 3) * I;
-  Q.block<3, 3>(kPhi, kBg) = Q.block<3, 3>(kBg, kPhi) = -0.5 * qg * dt * dt * I;
-  Q.block<3, 3>(kBg, kBg) = qg * dt * I;
-  Q.block<3, 3>(kBa, kBa) = square(noise_.accel_walk) * dt * I;
-  const Matrix15d P = F * state.covariance * F.transpose() + Q;
+  const Matrix15d P = F * state.covariance * F.transpose() + process_noise(noise_, dt);
   state.covariance = 0.5 * (P + P.transpose());
 }
 

@@ -15,6 +15,7 @@ class Motion {
   Motion(MotionModel model, const FusionConfig& config, const ImuNoise& noise);
 
   MotionModel model() const { return model_; }
+  /// In the map, m/s^2; zero where no accelerometer is to be freed of it.
   const Eigen::Vector3d& gravity_map() const { return gravity_map_; }
   /// Densities in use: the IMU's times the configured scale.
   const ImuNoise& noise() const { return noise_; }

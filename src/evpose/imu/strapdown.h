@@ -15,9 +15,21 @@ struct NavState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, map frame
 };
 
-/// One step from a.t to b.t with the means of the two samples, biases taken off:
-///   R' = R Exp(w dt),  v' = v + (R_mid f + g) dt,  p' = p + v dt + (R_mid f + g) dt^2 / 2,
-/// R_mid = R Exp(w dt / 2). Error per step O(dt^3).
+/// What the IMU says of the time from a to b, in the body frame of a and free of gravity.
+struct ImuIncrement {
+  double dt_s = 0;
+  Eigen::Quaterniond dq = Eigen::Quaterniond::Identity();  ///< R_a_b
+  Eigen::Vector3d dv = Eigen::Vector3d::Zero();            ///< integral of R_a_s f(s), m/s
+  Eigen::Vector3d dp = Eigen::Vector3d::Zero();            ///< its integral, m
+};
+
+/// Rate and specific force are linear between the samples, biases taken off: rotation by the Magnus series
+/// with the coning term dt^2 w_a x w_b / 12, velocity and position by Simpson's rule. The error of a step is
+/// O(dt^5), beside that of taking the signals as linear.
+ImuIncrement integrate(const ImuSample& a, const ImuSample& b, const Eigen::Vector3d& gyro_bias,
+                       const Eigen::Vector3d& accel_bias);
+
+/// One step from a.t to b.t by integrate() and gravity.
 NavState strapdown(const NavState& state, const ImuSample& a, const ImuSample& b,
                    const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias,
                    const Eigen::Vector3d& gravity_map);

@@ -33,6 +33,7 @@ int run_program(int argc, char** argv) {
   add_serve(app, run);
   add_view(app, run);
   add_mavlink(app, run);
+  add_bench(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

@@ -98,6 +98,7 @@ double peak_memory_mb() {
 void describe(ConfigTable& table, RunConfig& c) {
   describe(table, c.tracker);
   table.add("packet_ms", c.packet_ms, "ms", "length of the packets in which events are read", {1e-3, 1e5});
+  table.add("states_imu", c.states_imu, "write states_imu.csv: the state at each IMU sample");
   table.add("overlays", c.overlays, "", "pictures of the map over the time surface in the report", {0, 100});
 }
 
@@ -208,6 +209,8 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
     run->add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start.t)), " s"),
                      draw_overlay(s.size.width, s.size.height, s.decay, points));
   });
+
+  if (config.states_imu) (*tracker)->on_state([&](const FusionState& s) { run->add_state(s); });
 
   const double wall_start = wall_s(), cpu_start = cpu_s();
   Progress progress("tracking");

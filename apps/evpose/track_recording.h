@@ -17,6 +17,7 @@ namespace evpose {
 struct RunConfig {
   TrackerConfig tracker;
   double packet_ms = 1;  ///< events are read in packets of this length; the result does not depend on it
+  bool states_imu = false;  ///< states_imu.csv: the state at each IMU sample
   int overlays = 8;      ///< pictures of the map over the time surface in the report
 };
 void describe(ConfigTable& table, RunConfig& config);

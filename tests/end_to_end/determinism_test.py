@@ -16,7 +16,7 @@ except ImportError as missing:
 from recording import Recording
 
 EVPOSE = None
-FILES = ("trajectory.tum", "trajectory_camera.tum", "states.csv")
+FILES = ("trajectory.tum", "trajectory_camera.tum", "states.csv", "states_imu.csv")
 
 
 class DeterminismTest(unittest.TestCase):
@@ -31,7 +31,7 @@ class DeterminismTest(unittest.TestCase):
     @classmethod
     def track(cls, name, *settings):
         command = [EVPOSE, "track", cls.folder, "--map", cls.folder / "contours.ply", "-o", cls.root / name]
-        for setting in settings:
+        for setting in ("states_imu=true", *settings):
             command += ["--set", setting]
         subprocess.run([str(word) for word in command], check=True, capture_output=True, timeout=60)
         return {file: (cls.root / name / file).read_bytes() for file in FILES}
@@ -47,6 +47,13 @@ class DeterminismTest(unittest.TestCase):
     def test_packets_of_any_length(self):
         self.same("packet_ms=0.1")
         self.same("packet_ms=10")
+
+    def test_every_back_end(self):
+        for kind in ("graph", "particle", "ekf"):
+            reference = self.track(f"{kind}_1", f"fusion.kind={kind}")
+            again = self.track(f"{kind}_2", f"fusion.kind={kind}", "packet_ms=7", "threads=3")
+            for file in FILES:
+                self.assertTrue(again[file] == reference[file], f"{file} differs with {kind}")
 
     def test_any_number_of_threads(self):
         self.same("threads=1")

@@ -20,6 +20,8 @@ void describe(ConfigTable& table, FusionConfig& c) {
             {1e-6, 1e6});
   table.add("cv_angular_density", c.cv_angular_density, "rad/s^2/sqrt(Hz)",
             "without IMU: white angular acceleration", {1e-6, 1e6});
+  table.add("blind_gyro_density", c.blind_gyro_density, "rad/s/sqrt(Hz)",
+            "white angular rate while the IMU is saturated, stuck or silent", {1e-6, 1e6});
   table.add("start_position_sigma_m", c.start_position_sigma_m, "m", "error of the start position, 1 sigma",
             {1e-6, 10});
   table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad",
@@ -34,13 +36,26 @@ void describe(ConfigTable& table, FusionConfig& c) {
             "without IMU: error of the start's angular rate, 1 sigma", {1e-6, 10});
   table.group("window", c.window);
   table.group("particle", c.particle);
+  table.group("calibration", c.calibration);
 }
 
-std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise) {
+void describe(ConfigTable& table, CalibrationConfig& c) {
+  table.add("time_offset", c.time_offset, "estimate the time offset of the IMU against the camera (ekf)");
+  table.add("rotation", c.rotation, "estimate the rotation of the camera in the body (ekf)");
+  table.add("start_time_sigma_s", c.start_time_sigma_s, "s", "error of the given time offset, 1 sigma", {1e-6, 1});
+  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad", "error of the given rotation, 1 sigma",
+            {1e-6, 1});
+  table.add("least_velocity_m_s", c.least_velocity_m_s, "m/s",
+            "frozen while velocity changes by less over half a second ...", {0, 100});
+  table.add("least_rate_rad_s", c.least_rate_rad_s, "rad/s", "... and the angular rate by less than this", {0, 100});
+}
+
+std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,
+                                       const Pose& T_body_cam) {
   const Motion motion(model, config, noise);
   switch (config.kind) {
     case BackEndKind::ekf:
-      return std::make_unique<Ekf>(motion);
+      return std::make_unique<Ekf>(motion, config.calibration, T_body_cam);
     case BackEndKind::graph:
       return std::make_unique<Graph>(motion, config.window);
     case BackEndKind::particle:

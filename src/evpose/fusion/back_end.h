@@ -26,9 +26,28 @@ void describe(ConfigTable& table, WindowConfig& config);
 /// Of BackEndKind::particle.
 struct ParticleConfig {
   int particles = 500;
-  double resample_below = 0.5;  ///< share of effective particles
 };
 void describe(ConfigTable& table, ParticleConfig& config);
+
+/// Online calibration by BackEndKind::ekf.
+struct CalibrationConfig {
+  bool time_offset = false;  ///< of the IMU against the camera
+  bool rotation = false;     ///< of the camera in the body
+  double start_time_sigma_s = 0.02;
+  double start_rotation_sigma_rad = 0.02;
+  double least_velocity_m_s = 0.05;  ///< changes of velocity over half a second ...
+  double least_rate_rad_s = 0.05;    ///< ... and of angular rate: below both it is frozen
+};
+void describe(ConfigTable& table, CalibrationConfig& config);
+
+/// What is found to be wrong with the given calibration.
+struct Calibration {
+  double time_offset_s = 0;  ///< IMU time of an instant minus camera time, beside the configured one
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  ///< true R_body_cam = turn * given
+  double time_sigma_s = 0;
+  Eigen::Vector3d turn_sigma_rad = Eigen::Vector3d::Zero();  ///< about the body's axes
+  bool frozen = true;  ///< too little motion to tell it from an error of the pose
+};
 
 struct FusionConfig {
   BackEndKind kind = BackEndKind::ekf;
@@ -38,6 +57,7 @@ struct FusionConfig {
   double cv_accel_density = 1.5;    ///< constant velocity: white acceleration, m/s^2/sqrt(Hz); about 6 m/s^2
                                     ///< that keep up for 50 ms. More only opens the gate to clutter.
   double cv_angular_density = 1.5;  ///< ... white angular acceleration, rad/s^2/sqrt(Hz), likewise
+  double blind_gyro_density = 0.1;  ///< rad/s/sqrt(Hz), while the IMU is not to be relied on
   double start_position_sigma_m = 2e-3;
   double start_rotation_sigma_rad = 2e-3;
   double start_velocity_sigma_m_s = 0.05;
@@ -46,6 +66,7 @@ struct FusionConfig {
   double start_angular_rate_sigma_rad_s = 0.2;  ///< constant velocity only
   WindowConfig window;
   ParticleConfig particle;
+  CalibrationConfig calibration;
 };
 void describe(ConfigTable& table, FusionConfig& config);
 
@@ -58,7 +79,8 @@ class BackEnd {
   /// `angular_rate_body` is used by constant velocity only.
   virtual void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) = 0;
   /// IMU model: one step between two samples; a.t must be the state's time. Both in the body frame.
-  virtual void predict(const ImuSample& a, const ImuSample& b) = 0;
+  /// Suspect: the samples, or the time between them, are not to be relied on.
+  virtual void predict(const ImuSample& a, const ImuSample& b, bool suspect) = 0;
   /// Constant velocity: to time t >= the state's.
   virtual void predict(TimeNs t) = 0;
   /// Measurement at the state's time, relative to state().nav.T_map_body, as registration returns it.
@@ -66,12 +88,18 @@ class BackEnd {
   /// The newest state, with its covariance. A copy can be carried to any later time by motion().
   virtual const FusionState& state() const = 0;
 
+  /// Of the pose that the next measurement will see: the state's, and that of the calibration.
+  virtual Matrix6d measured_covariance() const { return state().pose_covariance(); }
+  virtual Calibration calibration() const { return {}; }
+
   const Motion& motion() const { return motion_; }
 
  private:
   Motion motion_;
 };
 
-std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise);
+/// `T_body_cam` as given: used by the calibration alone.
+std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,
+                                       const Pose& T_body_cam);
 
 }  // namespace evpose

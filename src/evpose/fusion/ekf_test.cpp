@@ -51,7 +51,7 @@ TEST(Ekf, CovarianceGrowsAsDifferencesOfTheStrapdownSay) {
   Ekf ekf(Motion(MotionModel::imu, config, silent));
   ekf.start(0, some_state(), {0, 0, 0});
   const Matrix15d P = ekf.state().covariance;
-  ekf.predict(a, b);
+  ekf.predict(a, b, false);
   const Matrix15d expected = F * P * F.transpose();
   const Matrix15d got = ekf.state().covariance;
   const Vector15d sigma = expected.diagonal().cwiseSqrt();
@@ -72,7 +72,7 @@ TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
   const TimeNs dt = kNsPerMs;
   NavState truth = some_state();
   for (int k = 0; k < steps; ++k) {
-    ekf.predict(sample(k * dt), sample((k + 1) * dt));
+    ekf.predict(sample(k * dt), sample((k + 1) * dt), false);
     truth = strapdown(truth, sample(k * dt), sample((k + 1) * dt), {0, 0, 0}, {0, 0, 0}, kGravity);
   }
   std::mt19937 random(5);
@@ -117,7 +117,7 @@ PoseInformation full_measurement(const Vector6d& offset) {
 TEST(Ekf, UpdateIsTheTextbookKalmanUpdate) {
   Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}));
   ekf.start(0, some_state(), {0, 0, 0});
-  for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs));
+  for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), false);
   const FusionState before = ekf.state();
   Vector6d z;
   z << 1e-3, -2e-3, 5e-4, 1e-5, 2e-5, -1e-5;
@@ -127,7 +127,7 @@ TEST(Ekf, UpdateIsTheTextbookKalmanUpdate) {
   const Eigen::Matrix<double, 15, 6> K = P_x * S.inverse();
   const Vector15d dx = K * z;
   const Matrix15d P = before.covariance - K * P_x.transpose();
-  EXPECT_NEAR(innovation(ekf.state(), m), z.dot(S.inverse() * z) / 6, 1e-9);
+  EXPECT_NEAR(innovation(ekf.state().pose_covariance(), m), z.dot(S.inverse() * z) / 6, 1e-9);
   ekf.update(m);
   EXPECT_LT((ekf.state().nav.T_map_body.minus(before.nav.T_map_body) - dx.head<6>()).norm(), 1e-10);
   EXPECT_LT((ekf.state().nav.velocity - before.nav.velocity - dx.segment<3>(6)).norm(), 1e-12);
@@ -153,7 +153,7 @@ TEST(Ekf, EmptyMeasurementChangesNothing) {
   Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}));
   ekf.start(0, some_state(), {0, 0, 0});
   const Matrix15d before = ekf.state().covariance;
-  EXPECT_EQ(innovation(ekf.state(), {}), 0);
+  EXPECT_EQ(innovation(ekf.state().pose_covariance(), {}), 0);
   ekf.update({});
   EXPECT_EQ(ekf.state().covariance, before);
 }

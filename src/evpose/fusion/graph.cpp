@@ -23,9 +23,9 @@ void Graph::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_
   waiting_ = 0;
 }
 
-void Graph::predict(const ImuSample& a, const ImuSample& b) {
-  motion().step(state_, a, b);
-  since_.add(a, b, motion().noise());
+void Graph::predict(const ImuSample& a, const ImuSample& b, bool suspect) {
+  motion().step(state_, a, b, suspect);
+  since_.add(a, b, motion().noise(suspect));
 }
 
 void Graph::predict(TimeNs t) {

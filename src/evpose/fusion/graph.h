@@ -13,7 +13,7 @@ class Graph : public BackEnd {
   Graph(const Motion& motion, const WindowConfig& config);
 
   void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) override;
-  void predict(const ImuSample& a, const ImuSample& b) override;
+  void predict(const ImuSample& a, const ImuSample& b, bool suspect) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement) override;
   const FusionState& state() const override { return state_; }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/fusion/motion.h"
 
+#include <algorithm>
+
 #include "evpose/core/error.h"
 #include "evpose/fusion/back_end.h"
 #include "evpose/fusion/preintegration.h"
@@ -27,6 +29,9 @@ Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
     gyro_sigma = c.start_angular_rate_sigma_rad_s;
     accel_sigma = 0;
   }
+  blind_noise_ = noise_;
+  blind_noise_.accel_density = std::max(noise_.accel_density, c.cv_accel_density);
+  blind_noise_.gyro_density = std::max(noise_.gyro_density, c.blind_gyro_density);
   start_sigma_.segment<3>(kP).setConstant(c.start_position_sigma_m);
   start_sigma_.segment<3>(kPhi).setConstant(c.start_rotation_sigma_rad);
   start_sigma_.segment<3>(kV).setConstant(c.start_velocity_sigma_m_s);
@@ -45,7 +50,8 @@ FusionState Motion::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& 
 }
 
 void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-                    const Eigen::Vector3d& force, double dt) const {
+                    const Eigen::Vector3d& force, double dt, bool suspect,
+                    Matrix15d* transition) const {
   const Eigen::Quaterniond q_mid = before.T_map_body.q * so3::exp(0.5 * dt * rate);
   const Eigen::Matrix3d R = q_mid.toRotationMatrix();
   // The attitude error is in the body of the step's start; seen from its middle it has turned half the way.
@@ -63,22 +69,26 @@ void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vec
     F.block<3, 3>(kP, kBa) = -0.5 * dt * dt * R;
   }
 
-  const Matrix15d P = F * state.covariance * F.transpose() + process_noise(noise_, dt);
+  const Matrix15d P = F * state.covariance * F.transpose() + process_noise(noise(suspect), dt);
   state.covariance = 0.5 * (P + P.transpose());
+  if (transition != nullptr) *transition = F;
 }
 
-void Motion::step(FusionState& state, const ImuSample& a, const ImuSample& b) const {
+void Motion::step(FusionState& state, const ImuSample& a, const ImuSample& b, bool suspect,
+                  Matrix15d* transition) const {
+  if (transition != nullptr) transition->setIdentity();
   EVPOSE_CHECK(model_ == MotionModel::imu && a.t == state.t && b.t >= a.t);
   if (b.t == a.t) return;
   const NavState before = state.nav;
   state.nav = strapdown(before, a, b, state.gyro_bias, state.accel_bias, gravity_map_);
   state.t = b.t;
   spread(state, before, 0.5 * (a.gyro + b.gyro) - state.gyro_bias,
-         0.5 * (a.accel + b.accel) - state.accel_bias, to_seconds(b.t - a.t));
+         0.5 * (a.accel + b.accel) - state.accel_bias, to_seconds(b.t - a.t), suspect, transition);
   state.angular_rate = b.gyro - state.gyro_bias;
 }
 
-void Motion::step(FusionState& state, TimeNs t) const {
+void Motion::step(FusionState& state, TimeNs t, Matrix15d* transition) const {
+  if (transition != nullptr) transition->setIdentity();
   EVPOSE_CHECK(model_ == MotionModel::constant_velocity && t >= state.t);
   if (t == state.t) return;
   const double dt = to_seconds(t - state.t);
@@ -87,7 +97,7 @@ void Motion::step(FusionState& state, TimeNs t) const {
   state.nav.T_map_body.q = (before.T_map_body.q * so3::exp(dt * state.angular_rate)).normalized();
   state.nav.T_map_body.p += dt * before.velocity;
   state.t = t;
-  spread(state, before, state.angular_rate, Eigen::Vector3d::Zero(), dt);
+  spread(state, before, state.angular_rate, Eigen::Vector3d::Zero(), dt, false, transition);
 }
 
 }  // namespace evpose

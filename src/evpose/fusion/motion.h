@@ -17,24 +17,27 @@ class Motion {
   MotionModel model() const { return model_; }
   /// In the map, m/s^2; zero where no accelerometer is to be freed of it.
   const Eigen::Vector3d& gravity_map() const { return gravity_map_; }
-  /// Densities in use: the IMU's times the configured scale.
-  const ImuNoise& noise() const { return noise_; }
+  /// Densities in use: the IMU's times the configured scale, or those of a suspect step.
+  const ImuNoise& noise(bool suspect = false) const { return suspect ? blind_noise_ : noise_; }
 
   /// The state at the start, with its configured uncertainty. The rate is used by constant velocity only.
   FusionState start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const;
 
   /// IMU model: one step between two samples in the body frame; a.t must be the state's time.
-  void step(FusionState& state, const ImuSample& a, const ImuSample& b) const;
+  /// `transition`: what becomes of the state's error. A suspect step is carried out with the noise of a vehicle that nobody measures.
+  void step(FusionState& state, const ImuSample& a, const ImuSample& b, bool suspect = false,
+            Matrix15d* transition = nullptr) const;
   /// Constant velocity: to time t >= the state's.
-  void step(FusionState& state, TimeNs t) const;
+  void step(FusionState& state, TimeNs t, Matrix15d* transition = nullptr) const;
 
  private:
   void spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-              const Eigen::Vector3d& force, double dt_s) const;
+              const Eigen::Vector3d& force, double dt_s, bool suspect,
+              Matrix15d* transition) const;
 
   MotionModel model_;
   Eigen::Vector3d gravity_map_;
-  ImuNoise noise_;
+  ImuNoise noise_, blind_noise_;
   Vector15d start_sigma_;
 };
 

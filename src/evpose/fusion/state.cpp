@@ -23,7 +23,7 @@ Vector15d FusionState::minus(const FusionState& other) const {
   return d;
 }
 
-double innovation(const FusionState& state, const PoseInformation& m) {
+double innovation(const Matrix6d& pose_covariance, const PoseInformation& m) {
   // z = H^-1 b has covariance P + H^-1, so that NIS = z^T (P + H^-1)^-1 z = b^T (H + H P H)^-1 b on H's
   // range.
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(m.information);
@@ -34,7 +34,7 @@ double innovation(const FusionState& state, const PoseInformation& m) {
   for (int i = 0; i < 6; ++i)
     if (eigen.eigenvalues()(i) > 1e-12 * largest) basis.col(rank++) = eigen.eigenvectors().col(i);
   const Eigen::MatrixXd U = basis.leftCols(rank);
-  const Matrix6d S = m.information + m.information * state.pose_covariance() * m.information;
+  const Matrix6d S = m.information + m.information * pose_covariance * m.information;
   const Eigen::VectorXd b = U.transpose() * m.vector;
   return b.dot((U.transpose() * S * U).ldlt().solve(b)) / rank;
 }

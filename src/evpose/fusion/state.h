@@ -43,8 +43,8 @@ struct PoseInformation {
   Vector6d vector = Vector6d::Zero();
 };
 
-/// Normalised innovation squared of a measurement at the state's pose, divided by its rank: about 1 when
-/// both know how good they are.
-double innovation(const FusionState& state, const PoseInformation& measurement);
+/// Normalised innovation squared of a measurement relative to a predicted pose of this covariance, divided by
+/// its rank: about 1 when both know how good they are.
+double innovation(const Matrix6d& pose_covariance, const PoseInformation& measurement);
 
 }  // namespace evpose

@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kFiles{"trajectory.tum", "trajectory_camera.tum", "states.csv", "latency.csv",
-                            "summary.json",   "config.yaml",           "report.html"};
+constexpr std::array kFiles{"trajectory.tum", "trajectory_camera.tum", "states.csv",  "states_imu.csv",
+                            "latency.csv",    "summary.json",          "config.yaml", "report.html"};
 
 /// Nothing, an empty folder, or an earlier run may be replaced.
 Status check_place(const fs::path& place) {
@@ -66,7 +66,7 @@ std::optional<TrajectoryScore> score_run(const StateLog& log, const std::vector<
 
 struct RunFolder::State {
   fs::path place, folder;  ///< where it will stand; where it is made
-  std::optional<AtomicFile> states, latency;
+  std::optional<AtomicFile> states, latency, states_imu;
   StateLog log;
   std::vector<OverlayPicture> overlays;
   bool finished = false;
@@ -152,6 +152,17 @@ void RunFolder::add(const Update& update) {
   state_->log.add(update);
 }
 
+void RunFolder::add_state(const FusionState& state) {
+  EVPOSE_CHECK(state_ && !state_->finished);
+  if (!state_->states_imu) {
+    auto opened = AtomicFile::create(state_->file("states_imu.csv"));
+    if (!opened) return;  // the same folder as the other files': they tell
+    state_->states_imu.emplace(std::move(opened).value());
+    state_->states_imu->write(imu_states_csv_header());
+  }
+  state_->states_imu->write(imu_states_csv_row(state));
+}
+
 void RunFolder::add_overlay(const std::string& caption, const RgbImage& image) {
   EVPOSE_CHECK(state_ && !state_->finished);
   state_->overlays.push_back({caption, encode_png(image), image.width, image.height});
@@ -171,6 +182,8 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
   };
   if (Status done = s.states->commit(); !done) return done.error();
   if (Status done = s.latency->commit(); !done) return done.error();
+  if (s.states_imu)
+    if (Status done = s.states_imu->commit(); !done) return done.error();
   if (Status done = s.write_trajectories(summary.T_body_cam); !done) return done.error();
   if (Status done = write("config.yaml", config.to_yaml()); !done) return done.error();
   if (Status done = write("summary.json", summary_json(s.log, summary, config, out.score)); !done)

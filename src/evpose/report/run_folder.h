@@ -17,6 +17,8 @@
 
 namespace evpose {
 
+struct FusionState;
+
 /// What a run folder is told at the end, beside the updates.
 struct RunSummary {
   std::string title;     ///< of the report, e.g. the recording's name
@@ -40,8 +42,8 @@ struct RunOutcome {
   std::string report;                    ///< path of report.html
 };
 
-/// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, latency.csv, summary.json,
-/// config.yaml and report.html. It is made under a temporary name beside its place and moved there when all
+/// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, if wanted states_imu.csv, latency.csv,
+/// summary.json, config.yaml and report.html. It is made under a temporary name beside its place and moved there when all
 /// is written, so that nothing is changed by a run that fails. The same estimates give the same bytes, but
 /// for what depends on wall time: latency.csv, report.html, and "latency", "resources" and "rate_mev_s" in
 /// summary.json.
@@ -57,6 +59,8 @@ class RunFolder {
 
   /// In order of time. Errors of writing are told by finish().
   void add(const Update& update);
+  /// A state at an IMU sample, in order of time, for states_imu.csv; the file is made with the first.
+  void add_state(const FusionState& state);
   /// A picture for the report.
   void add_overlay(const std::string& caption, const RgbImage& image);
 

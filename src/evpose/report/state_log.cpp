@@ -4,6 +4,8 @@
 #include <cinttypes>
 #include <cstdio>
 
+#include "evpose/fusion/state.h"
+
 namespace evpose {
 namespace {
 
@@ -30,6 +32,29 @@ void append(std::string* row, double value) {
 
 void append(std::string* row, const Eigen::Vector3d& v) {
   for (int i = 0; i < 3; ++i) append(row, v[i]);
+}
+
+const char* const kStateColumns =
+    "t_s,x_m,y_m,z_m,qx,qy,qz,qw,vx_m_s,vy_m_s,vz_m_s,gyro_bias_x_rad_s,gyro_bias_y_rad_s,gyro_bias_z_rad_s,"
+    "accel_bias_x_m_s2,accel_bias_y_m_s2,accel_bias_z_m_s2";
+
+/// Upper triangle of the covariance of (translation in the map, rotation in the body), m and rad.
+std::string covariance_columns() {
+  std::string out;
+  const char* const axes[] = {"x", "y", "z", "rx", "ry", "rz"};
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) out += std::string(",cov_") + axes[i] + "_" + axes[j];
+  return out;
+}
+
+void append(std::string* row, const Pose& T) {
+  append(row, T.p);
+  for (const double c : {T.q.x(), T.q.y(), T.q.z(), T.q.w()}) append(row, c);
+}
+
+void append(std::string* row, const Matrix6d& covariance) {
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) append(row, covariance(i, j));
 }
 
 /// Text as a CSV field.
@@ -72,27 +97,17 @@ void StateLog::add(const Update& u) {
 }
 
 std::string states_csv_header() {
-  std::string out =
-      "t_s,x_m,y_m,z_m,qx,qy,qz,qw,vx_m_s,vy_m_s,vz_m_s,gyro_bias_x_rad_s,gyro_bias_y_rad_s,gyro_bias_z_rad_"
-      "s,"
-      "accel_bias_x_m_s2,accel_bias_y_m_s2,accel_bias_z_m_s2";
-  // Upper triangle of the covariance of (translation in the map, rotation in the body), m and rad.
-  const char* const axes[] = {"x", "y", "z", "rx", "ry", "rz"};
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) out += std::string(",cov_") + axes[i] + "_" + axes[j];
-  return out + ",health,accepted,events_read,events_kept,points,points_matched,residual,innovation,reason\n";
+  return kStateColumns + covariance_columns() +
+         ",health,accepted,events_read,events_kept,points,points_matched,residual,innovation,reason\n";
 }
 
 std::string states_csv_row(const Update& u) {
   std::string row = seconds_text(u.t);
-  append(&row, u.T_map_body.p);
-  for (const double c : {u.T_map_body.q.x(), u.T_map_body.q.y(), u.T_map_body.q.z(), u.T_map_body.q.w()})
-    append(&row, c);
+  append(&row, u.T_map_body);
   append(&row, u.velocity);
   append(&row, u.gyro_bias);
   append(&row, u.accel_bias);
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) append(&row, u.covariance(i, j));
+  append(&row, u.covariance);
   char counts[100];
   std::snprintf(counts, sizeof counts, ",%s,%d,%d,%d,%d,%d", to_string(u.health), u.accepted ? 1 : 0,
                 u.events_read, u.events_kept, u.points, u.points_matched);
@@ -100,6 +115,21 @@ std::string states_csv_row(const Update& u) {
   append(&row, u.residual);
   append(&row, u.innovation);
   return row + (u.reason.empty() ? "," : "," + quoted(u.reason)) + "\n";
+}
+
+std::string imu_states_csv_header() {
+  return std::string(kStateColumns) + ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s" + covariance_columns() + "\n";
+}
+
+std::string imu_states_csv_row(const FusionState& s) {
+  std::string row = seconds_text(s.t);
+  append(&row, s.nav.T_map_body);
+  append(&row, s.nav.velocity);
+  append(&row, s.gyro_bias);
+  append(&row, s.accel_bias);
+  append(&row, s.angular_rate);
+  append(&row, s.pose_covariance());
+  return row + "\n";
 }
 
 std::string latency_csv_header() {

@@ -11,6 +11,8 @@
 
 namespace evpose {
 
+struct FusionState;
+
 /// What a run folder remembers of an update until it is finished: about a quarter of a kilobyte.
 struct StateRow {
   TimeNs t = 0;
@@ -45,6 +47,9 @@ struct StateLog {
 /// Columns and rows of states.csv, everything that does not depend on wall time.
 std::string states_csv_header();
 std::string states_csv_row(const Update& update);
+/// Columns and rows of states_imu.csv: the state at each IMU sample.
+std::string imu_states_csv_header();
+std::string imu_states_csv_row(const FusionState& state);
 /// Columns and rows of latency.csv: wall time by stage.
 std::string latency_csv_header();
 std::string latency_csv_row(const Update& update);

@@ -45,6 +45,7 @@ void describe(ConfigTable& table, TrackerConfig& c) {
   table.group("alignment", c.alignment);
   table.group("exponential", c.exponential);
   table.group("fusion", c.fusion);
+  table.group("imu", c.imu);
   table.group("health", c.health);
 }
 
@@ -75,9 +76,12 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       index_(*setup_.map),
       visible_(index_, *setup_.camera, spread(config)),
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
-      fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise)),
+      fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
       health_(config.health),
+      imu_watch_(config.imu),
+      given_q_body_cam_(setup.T_body_cam.q),
       start_t_(start.t),
+      last_update_(start.t),
       alignment_(setup_.camera->size(), config.alignment) {
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
@@ -86,9 +90,13 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
 
 void Tracker::add_imu(const ImuSample& sample) {
   if (setup_.motion != MotionModel::imu) return;
-  imu_.push_back(sample);
+  const auto checked = imu_watch_.take(sample);
+  if (!checked) return;
+  imu_.push_back(*checked);
+  if (state_callback_) to_tell_.push_back(*checked);
   // Before the start only the last sample matters.
-  while (imu_.size() >= 2 && imu_[1].t <= fusion_->state().t) imu_.pop_front();
+  while (imu_.size() >= 2 && imu_[1].sample.t <= fusion_->state().t) imu_.pop_front();
+  tell_states();
   pump();
 }
 
@@ -124,11 +132,43 @@ void Tracker::consume(const EventPacket& packet, std::size_t* from) {
     // An event after the update's time proves that all events up to it are here.
     *from += feed(packet, *from, next_update_);
     if (*from == packet.events.size()) return;
-    if (setup_.motion == MotionModel::imu && (imu_.empty() || imu_.back().t < next_update_)) return;
-    const Update result = update(next_update_);
-    ++update_number_;
-    next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
-    if (callback_) callback_(result);
+    if (!imu_reaches(imu_time(next_update_))) return;
+    make_update();
+  }
+}
+
+TimeNs Tracker::imu_time(TimeNs t) const {
+  return t + from_seconds(fusion_->calibration().time_offset_s);
+}
+
+bool Tracker::imu_reaches(TimeNs t) const {
+  return setup_.motion != MotionModel::imu || (!imu_.empty() && imu_.back().sample.t >= t);
+}
+
+void Tracker::make_update() {
+  const Update result = update(next_update_);
+  ++update_number_;
+  next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
+  if (callback_) callback_(result);
+  if (!state_callback_ || setup_.motion != MotionModel::imu) return;
+  ahead_ = fusion_->state();
+  told_ = imu_.front().sample;
+  tell_states();
+}
+
+void Tracker::events_complete_until(TimeNs t) {
+  while (waiting_.empty() && next_update_ <= t && imu_reaches(imu_time(next_update_))) make_update();
+}
+
+void Tracker::tell_states() {
+  while (!to_tell_.empty() && to_tell_.front().sample.t < imu_time(next_update_)) {
+    const auto& [sample, suspect] = to_tell_.front();
+    if (update_number_ > 0 && sample.t > ahead_.t) {
+      fusion_->motion().step(ahead_, told_, sample, suspect);
+      told_ = sample;
+      state_callback_(ahead_);
+    }
+    to_tell_.pop_front();
   }
 }
 
@@ -137,15 +177,21 @@ void Tracker::predict(TimeNs t) {
   // Make the first sample stand at the state's time, then step from sample to sample; the last step ends at
   // t.
   const TimeNs from = fusion_->state().t;
-  if (imu_.front().t > from) imu_.push_front({from, imu_.front().gyro, imu_.front().accel});
-  while (imu_.size() >= 2 && imu_[1].t <= from) imu_.pop_front();
-  if (imu_.front().t < from) imu_.front() = interpolate(imu_.front(), imu_[1], from);
-  while (imu_[1].t < t) {
-    fusion_->predict(imu_[0], imu_[1]);
+  if (t == from) return;
+  if (imu_.front().sample.t > from) {
+    CheckedImu first = imu_.front();
+    first.sample.t = from;
+    imu_.push_front(first);
+  }
+  while (imu_.size() >= 2 && imu_[1].sample.t <= from) imu_.pop_front();
+  if (imu_.front().sample.t < from)
+    imu_.front().sample = interpolate(imu_.front().sample, imu_[1].sample, from);
+  while (imu_[1].sample.t < t) {
+    fusion_->predict(imu_[0].sample, imu_[1].sample, imu_[0].suspect || imu_[1].suspect);
     imu_.pop_front();
   }
-  const ImuSample last = interpolate(imu_[0], imu_[1], t);
-  fusion_->predict(imu_[0], last);
+  const CheckedImu last{interpolate(imu_[0].sample, imu_[1].sample, t), imu_[1].suspect};
+  fusion_->predict(imu_[0].sample, last.sample, imu_[0].suspect || last.suspect);
   imu_.front() = last;
 }
 
@@ -207,7 +253,7 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
 }
 
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
-  const Matrix6d covariance = fusion_->state().pose_covariance();
+  const Matrix6d covariance = fusion_->measured_covariance();
   if (config_.field == FieldKind::events) {
     const EventAlignmentResult r = alignment_.align(
         {front_.kept(), front_.stamp(t), span_s, to_seconds(t - start_t_), samples_, covariance});
@@ -235,9 +281,10 @@ std::string Tracker::refusal(const Registration& r, double innovation) const {
 Update Tracker::update(TimeNs t) {
   Update out;
   out.t = t;
-  const double span_s = to_seconds(t - fusion_->state().t);
+  const double span_s = to_seconds(t - last_update_);
+  last_update_ = t;
   const double t0 = now();
-  predict(t);
+  predict(std::max(imu_time(t), fusion_->state().t));
   const Pose predicted = fusion_->state().nav.T_map_body;
   const double t1 = now();
 
@@ -249,10 +296,12 @@ Update Tracker::update(TimeNs t) {
 
   Evidence evidence;
   evidence.t = t;
-  out.innovation = innovation(fusion_->state(), stpe.measurement);
+  out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
   evidence.refused = refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
+  evidence.imu_fault = imu_watch_.fault(t);
   if (evidence.accepted) fusion_->update(stpe.measurement);  // eq. (5) for the newest state
+  setup_.T_body_cam.q = fusion_->calibration().turn * given_q_body_cam_;
 
   const Matrix6d covariance = fusion_->state().pose_covariance();
   const auto largest = [](const Eigen::Matrix3d& m) {
@@ -265,6 +314,7 @@ Update Tracker::update(TimeNs t) {
   out.health = health_.judge(evidence, &out.reason);
 
   const FusionState& state = fusion_->state();
+  out.t = state.t;
   out.T_map_body = state.nav.T_map_body;
   out.velocity = state.nav.velocity;
   out.gyro_bias = state.gyro_bias;

@@ -16,6 +16,7 @@
 #include "evpose/registration/event_alignment.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/health.h"
+#include "evpose/tracker/imu_watch.h"
 #include "evpose/tracker/update.h"
 
 namespace evpose {
@@ -29,6 +30,7 @@ struct TrackerConfig {
   EventAlignmentConfig alignment;  ///< of field == events
   RegistrationConfig exponential;  ///< of field == exponential
   FusionConfig fusion;
+  ImuWatchConfig imu;
   HealthConfig health;
 };
 void describe(ConfigTable& table, TrackerConfig& config);
@@ -64,11 +66,19 @@ class Tracker {
   /// Called at each update, in order of time.
   void on_update(std::function<void(const Update&)> callback) { callback_ = std::move(callback); }
 
+  /// Called for each IMU sample, in order of time, with the state at it: that of the newest update not after
+  /// it, carried on by the IMU. Which update that is does not depend on when samples and packets arrive.
+  void on_state(std::function<void(const FusionState&)> callback) { state_callback_ = std::move(callback); }
+
   /// In order of time. An update is made as soon as both streams have passed its time.
   void add_imu(const ImuSample& sample);
   void add_events(const EventPacket& packet);
+  /// All events up to t have been added: updates up to t need not wait for a later event.
+  void events_complete_until(TimeNs t);
 
   const EventFront& events() const { return front_; }
+  /// What the fusion found to be wrong with the given calibration, if it was asked to look.
+  Calibration calibration() const { return fusion_->calibration(); }
 
   /// What the alignment saw at the last update, for pictures.
   struct Snapshot {
@@ -91,6 +101,10 @@ class Tracker {
   /// Feeds the front with events of `packet` from `from` on that are not after `until`; the number fed.
   std::size_t feed(const EventPacket& packet, std::size_t from, TimeNs until);
   void consume(const EventPacket& packet, std::size_t* from);
+  void make_update();
+  TimeNs imu_time(TimeNs t) const;  ///< of an instant of the camera's clock
+  bool imu_reaches(TimeNs t) const;
+  void tell_states();
   void predict(TimeNs t);
   struct Registration {
     PoseInformation measurement;
@@ -115,11 +129,17 @@ class Tracker {
   std::unique_ptr<BackEnd> fusion_;
   HealthMonitor health_;
   std::function<void(const Update&)> callback_;
+  std::function<void(const FusionState&)> state_callback_;
+  ImuWatch imu_watch_;
+  FusionState ahead_;               ///< the state at the last sample told
+  ImuSample told_;                  ///< that sample; its time is ahead_'s
+  std::deque<CheckedImu> to_tell_;
 
-  TimeNs start_t_;
+  Eigen::Quaterniond given_q_body_cam_;
+  TimeNs start_t_, last_update_;
   std::int64_t update_number_ = 0;
   TimeNs next_update_ = 0;
-  std::deque<ImuSample> imu_;        ///< from the state's time on; the first is at it once started
+  std::deque<CheckedImu> imu_;       ///< from the state's time on; the first is at it once started
   std::deque<EventPacket> waiting_;  ///< events that arrived before their IMU samples
   std::size_t waiting_from_ = 0;     ///< consumed part of the first
   EventAlignment alignment_;

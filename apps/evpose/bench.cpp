@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench.h"
+
+#include <CLI/CLI.hpp>
+
+#include "commands.h"
+
+namespace evpose {
+
+std::vector<PeerRecording> peer_recordings(const std::string& folder) {
+  std::vector<PeerRecording> out;
+  for (const char* name : {"room_spiral", "room_720p", "room_people", "room_hover", "courtyard_landing"}) {
+    const std::string scene = std::string(name).substr(0, std::string(name).find('_'));
+    out.push_back({name, folder + "/" + name, folder + "/maps/" + scene + "_contours.ply",
+                   folder + "/maps/" + scene + "_mesh.ply"});
+  }
+  return out;
+}
+
+void add_bench(CLI::App& app, std::function<int()>& run) {
+  auto* bench = app.add_subcommand("bench", "Measure and print the tables of the documentation");
+  bench->require_subcommand(1);
+  add_bench_fusion(*bench, run);
+  add_bench_calibration(*bench, run);
+  add_bench_faults(*bench, run);
+}
+
+}  // namespace evpose

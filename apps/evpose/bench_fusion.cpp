@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The tables of docs/fusion.md: back ends side by side on the shared recordings.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "bench.h"
+#include "bench_streams.h"
+#include "commands.h"
+#include "evpose/eval/score.h"
+#include "evpose/io/config_yaml.h"
+
+namespace evpose {
+namespace {
+
+struct FusionBenchRequest {
+  std::string folder = "../shared/data/peer";
+  std::vector<std::string> only, assignments;
+};
+
+struct Variant {
+  const char* name;
+  bool imu;
+  std::vector<std::string> settings;
+};
+
+const std::vector<Variant>& variants() {
+  static const std::vector<Variant> all{
+      {"STPE alone", false, {}},
+      {"particle filter", true, {"fusion.kind=particle"}},
+      {"EKF", true, {"fusion.kind=ekf"}},
+      {"graph", true, {"fusion.kind=graph"}},
+  };
+  return all;
+}
+
+struct Figures {
+  Health at_end = Health::waiting;
+  TrajectoryScore score;              ///< of the updates
+  std::optional<double> jitter_mm;    ///< of the output at the IMU's rate
+  std::vector<double> latency_ms, fuse_ms;
+};
+
+double share(std::vector<double> values, double at) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0 : quantile(values, at);
+}
+
+Expected<Figures> measure(Streams streams, const Variant& variant, const FusionBenchRequest& request) {
+  ConfigTable table;
+  describe(table, streams.job.config);
+  for (const auto* list : {&variant.settings, &request.assignments})
+    for (const auto& assignment : *list)
+      if (auto ok = apply_assignment(table, assignment); !ok) return ok.error();
+  if (!variant.imu) streams.job.setup.motion = MotionModel::constant_velocity;
+  auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start, wall_s);
+  if (!tracker) return tracker.error();
+
+  Figures out;
+  std::vector<TimedPose> poses, fast_poses;
+  std::vector<Matrix6d> covariances;
+  std::vector<Eigen::Vector3d> velocities;
+  (*tracker)->on_update([&](const Update& u) {
+    out.at_end = u.health;
+    poses.push_back({u.t, u.T_map_body});
+    fast_poses.push_back(poses.back());
+    covariances.push_back(u.covariance);
+    velocities.push_back(u.velocity);
+    out.latency_ms.push_back(1e3 * u.times.after_newest_event_s());
+    out.fuse_ms.push_back(1e3 * u.times.fuse_s);
+  });
+  (*tracker)->on_state([&](const FusionState& s) { fast_poses.push_back({s.t, s.nav.T_map_body}); });
+  feed(streams.packets, variant.imu ? streams.imu : std::vector<ImuSample>{}, **tracker);
+  out.score = score_trajectory({poses, streams.job.truth, covariances, velocities, {}}, {});
+  out.jitter_mm = score_trajectory({fast_poses, streams.job.truth, {}, {}, {}}, {}).jitter_mm;
+  return out;
+}
+
+void print_row(const Variant& variant, const Figures& f) {
+  const TrajectoryScore& s = f.score;
+  const auto relative = [](const std::optional<RelativeError>& e) { return e.value_or(RelativeError{}); };
+  std::printf("| %s | %s | %.2f | %.3f | %.1f | %.3f | %.3f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.2f / %.2f | %.2f / %.2f |\n",
+              variant.name, to_string(f.at_end), s.ate_mm.mean, s.are_deg.mean, s.ate_mm.max,
+              relative(s.over_10ms).translation_mm, relative(s.over_10ms).rotation_deg,
+              relative(s.over_100ms).translation_mm, relative(s.over_100ms).rotation_deg,
+              s.velocity_rmse_mm_s.value_or(0), s.nees6_mean.value_or(0), s.lag_ms.value_or(0),
+              f.jitter_mm.value_or(0), share(f.latency_ms, 0.5), share(f.latency_ms, 0.99),
+              share(f.fuse_ms, 0.5), share(f.fuse_ms, 0.99));
+  std::fflush(stdout);
+}
+
+int bench_fusion(const FusionBenchRequest& request) {
+  std::printf("Made by `evpose bench fusion`; do not edit. Latency is that of the machine it ran on.\n");
+  for (const PeerRecording& peer : peer_recordings(request.folder)) {
+    if (!request.only.empty() &&
+        std::find(request.only.begin(), request.only.end(), peer.name) == request.only.end())
+      continue;
+    TrackRequest track;
+    track.recording = peer.folder;
+    track.map = peer.map;
+    track.occluders = peer.occluders;
+    const auto streams = load_streams(track, RunConfig{});
+    if (!streams) return bad_input(streams.error());
+    std::printf(
+        "\n### %s\n\n| back end | at the end | ATE mean mm | ARE mean deg | ATE max mm | RTE 10 ms mm | RRE 10 ms deg "
+        "| RTE 100 ms mm | RRE 100 ms deg | velocity mm/s | NEES/6 | lag ms | jitter mm | update p50 / p99 ms | "
+        "fusion p50 / p99 ms |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        peer.name.c_str());
+    for (const Variant& variant : variants()) {
+      const auto figures = measure(*streams, variant, request);
+      if (!figures) return bad_input(figures.error());
+      print_row(variant, *figures);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_bench_fusion(CLI::App& bench, std::function<int()>& run) {
+  auto* command = bench.add_subcommand("fusion", "Back ends side by side on the shared recordings");
+  auto request = std::make_shared<FusionBenchRequest>();
+  command->add_option("folder", request->folder, "folder with the recordings and maps")->capture_default_str();
+  command->add_option("--only", request->only, "names of recordings")->delimiter(',');
+  command->add_option("--set", request->assignments, "one setting, key=value, for all")->allow_extra_args(false);
+  command->callback([=, &run] { run = [=] { return bench_fusion(*request); }; });
+}
+
+}  // namespace evpose

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "evpose/event/event.h"
+#include "track_recording.h"
+
+namespace evpose {
+
+/// A recording in memory, to be tracked several times.
+struct Streams {
+  TrackJob job;
+  std::vector<EventPacket> packets;
+  std::vector<ImuSample> imu;
+};
+Expected<Streams> load_streams(const TrackRequest& request, const RunConfig& config);
+
+/// Feeds the packets and, ahead of each, the IMU samples that reach its end.
+void feed(const std::vector<EventPacket>& packets, const std::vector<ImuSample>& imu, Tracker& tracker);
+
+/// The pose, velocity and rate that the truth has at a time inside it.
+StartState start_at(const std::vector<TimedPose>& truth, TimeNs t);
+
+}  // namespace evpose

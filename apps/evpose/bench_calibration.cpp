@@ -22,9 +22,8 @@ struct Spoilt {
   Eigen::Vector3d turn_deg;  ///< of the given camera about the body's axes
 };
 
-const Spoilt kSpoilt[] = {{0, {0, 0, 0}},         {0.02, {0, 0, 0}},     {-0.02, {0, 0, 0}},
-                          {0, {1, 0, 0}},         {0, {0, 1, 0}},        {0, {0, 0, 1}},
-                          {0.01, {0.5, -0.5, 0.5}}};
+const Spoilt kSpoilt[] = {{0, {0, 0, 0}}, {0.02, {0, 0, 0}}, {-0.02, {0, 0, 0}},      {0, {1, 0, 0}},
+                          {0, {0, 1, 0}}, {0, {0, 0, 1}},    {0.01, {0.5, -0.5, 0.5}}};
 
 Status run_one(const PeerRecording& peer, Streams streams, const Spoilt& spoilt) {
   const bool turned = spoilt.turn_deg.norm() > 0;
@@ -71,8 +70,10 @@ int bench_calibration(const CalibrationRequest& request) {
   for (const auto& assignment : request.assignments)
     if (auto ok = apply_assignment(table, assignment); !ok) return bad_input(ok.error());
   std::printf(
-      "Made by `evpose bench calibration`; do not edit.\n\n| recording | offset given wrong by ms | rotation given wrong "
-      "by deg | at the end | offset error ms | rotation error deg | frozen %% of the time |\n|---|---|---|---|---|---|---|\n");
+      "Made by `evpose bench calibration`; do not edit.\n\n| recording | offset given wrong by ms | rotation "
+      "given wrong "
+      "by deg | at the end | offset error ms | rotation error deg | frozen %% of the time "
+      "|\n|---|---|---|---|---|---|---|\n");
   for (const PeerRecording& peer : peer_recordings(request.folder)) {
     if (peer.name == "room_720p") continue;
     TrackRequest track;
@@ -90,9 +91,11 @@ int bench_calibration(const CalibrationRequest& request) {
 }  // namespace
 
 void add_bench_calibration(CLI::App& bench, std::function<int()>& run) {
-  auto* command = bench.add_subcommand("calibration", "Time offset and camera rotation found from a wrong start");
+  auto* command =
+      bench.add_subcommand("calibration", "Time offset and camera rotation found from a wrong start");
   auto request = std::make_shared<CalibrationRequest>();
-  command->add_option("folder", request->folder, "folder with the recordings and maps")->capture_default_str();
+  command->add_option("folder", request->folder, "folder with the recordings and maps")
+      ->capture_default_str();
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command->callback([=, &run] { run = [=] { return bench_calibration(*request); }; });
 }

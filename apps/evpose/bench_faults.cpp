@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Replays of stretches of the shared recordings with a fault in one stream each, seeded: what does the tracker say, and
-// is it ever wrong without saying so?
+// Replays of stretches of the shared recordings with a fault in one stream each, seeded: what does the
+// tracker say, and is it ever wrong without saying so?
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -19,19 +19,38 @@
 namespace evpose {
 namespace {
 
-constexpr double kStretch_s = 0.9;    // of a replay
+constexpr double kStretch_s = 0.9;     // of a replay
 constexpr double kFaultFrom_s = 0.35;  // after its start, plus up to 0.1 s
 constexpr double kWrongSigma = 5;
 constexpr double kFlagWithin_s = 0.05;
 constexpr double kLost_m = 0.05, kLost_rad = 0.03;  // a pose so wrong is of no use
 
 enum class Fault {
-  none, imu_gap, imu_saturated, imu_stuck, imu_jump_ahead, imu_jump_back, imu_not_a_number, imu_spike,
-  events_drop_out, events_burst, events_packet_loss, events_stuck_rows
+  none,
+  imu_gap,
+  imu_saturated,
+  imu_stuck,
+  imu_jump_ahead,
+  imu_jump_back,
+  imu_not_a_number,
+  imu_spike,
+  events_drop_out,
+  events_burst,
+  events_packet_loss,
+  events_stuck_rows
 };
-constexpr std::array<const char*, 12> kNames{
-    "none", "IMU gap", "IMU saturated", "IMU axis stuck", "IMU clock jumps ahead", "IMU clock jumps back",
-    "IMU not a number", "IMU spikes", "event drop-out", "event burst", "event packet loss", "event rows stuck"};
+constexpr std::array<const char*, 12> kNames{"none",
+                                             "IMU gap",
+                                             "IMU saturated",
+                                             "IMU axis stuck",
+                                             "IMU clock jumps ahead",
+                                             "IMU clock jumps back",
+                                             "IMU not a number",
+                                             "IMU spikes",
+                                             "event drop-out",
+                                             "event burst",
+                                             "event packet loss",
+                                             "event rows stuck"};
 
 struct FaultsRequest {
   std::string folder = "../shared/data/peer";
@@ -95,7 +114,8 @@ void spoil_imu(Fault fault, TimeNs from, TimeNs to, std::mt19937& random, std::v
 void spoil_events(Fault fault, TimeNs from, TimeNs to, ImageSize size, std::mt19937& random,
                   std::vector<EventPacket>* packets) {
   for (EventPacket& packet : *packets) {
-    if (packet.empty() || packet.time(packet.events.front()) < from || packet.time(packet.events.front()) >= to)
+    if (packet.empty() || packet.time(packet.events.front()) < from ||
+        packet.time(packet.events.front()) >= to)
       continue;
     if (fault == Fault::events_drop_out) packet.events.clear();
     if (fault == Fault::events_packet_loss && random() % 10 < 7) packet.events.clear();
@@ -109,7 +129,8 @@ void spoil_events(Fault fault, TimeNs from, TimeNs to, ImageSize size, std::mt19
                                    random() % 2 == 0));
     if (fault == Fault::events_stuck_rows)
       for (int row = size.height / 4; row < size.height; row += size.height / 4)
-        for (int x = 0; x < size.width; ++x) extra.push_back(make_event(any_time(), x, row, random() % 2 == 0));
+        for (int x = 0; x < size.width; ++x)
+          extra.push_back(make_event(any_time(), x, row, random() % 2 == 0));
     packet.events.insert(packet.events.end(), extra.begin(), extra.end());
     std::stable_sort(packet.events.begin(), packet.events.end(),
                      [](const Event& a, const Event& b) { return a.dt_us < b.dt_us; });
@@ -128,7 +149,8 @@ Outcome replay(const Streams& streams, const Replay& what) {
 
   std::vector<EventPacket> packets;
   for (const EventPacket& p : streams.packets)
-    if (!p.empty() && p.time(p.events.front()) >= begin && p.time(p.events.back()) < end) packets.push_back(p);
+    if (!p.empty() && p.time(p.events.front()) >= begin && p.time(p.events.back()) < end)
+      packets.push_back(p);
   std::vector<ImuSample> imu;
   for (const ImuSample& s : streams.imu)
     if (s.t >= begin - 20 * kNsPerMs && s.t < end + 20 * kNsPerMs) imu.push_back(s);
@@ -199,10 +221,11 @@ int bench_faults(const FaultsRequest& request) {
     outcomes[i] = replay(streams[replays[i].recording], replays[i]);
   });
 
-  std::printf("Made by `evpose bench faults`; do not edit.\n\n%d replays of %.1f s, seed %u.\n\n", request.replays,
-              kStretch_s, request.seed);
+  std::printf("Made by `evpose bench faults`; do not edit.\n\n%d replays of %.1f s, seed %u.\n\n",
+              request.replays, kStretch_s, request.seed);
   std::printf(
-      "| fault | replays | named | first words | silent updates | pose of no use | of these told within 50 ms | "
+      "| fault | replays | named | first words | silent updates | pose of no use | of these told within 50 "
+      "ms | "
       "end error median / max mm | not finite |\n|---|---|---|---|---|---|---|---|---|\n");
   int silent = 0, silent_replays = 0, updates = 0, late = 0, not_finite = 0;
   for (std::size_t f = 0; f < kNames.size(); ++f) {
@@ -230,13 +253,14 @@ int bench_faults(const FaultsRequest& request) {
     std::string most;
     for (const auto& [word, n] : words)
       if (most.empty() || n > words[most]) most = word;
-    std::printf("| %s | %d | %d | %s | %d | %d | %d | %.1f / %.1f | %d |\n", kNames[f], count, named, most.c_str(),
-                quiet, lost, told, end_errors[end_errors.size() / 2], end_errors.back(), nan);
+    std::printf("| %s | %d | %d | %s | %d | %d | %d | %.1f / %.1f | %d |\n", kNames[f], count, named,
+                most.c_str(), quiet, lost, told, end_errors[end_errors.size() / 2], end_errors.back(), nan);
     silent += quiet;
     not_finite += nan;
   }
   std::printf(
-      "\n%d of %d updates are beyond %.0f sigma while called tracking, in %d replays; %d losses are told late or never; "
+      "\n%d of %d updates are beyond %.0f sigma while called tracking, in %d replays; %d losses are told "
+      "late or never; "
       "%d replays without a finite pose.\n",
       silent, updates, kWrongSigma, silent_replays, late, not_finite);
   return not_finite > 0 ? 1 : 0;
@@ -247,9 +271,14 @@ int bench_faults(const FaultsRequest& request) {
 void add_bench_faults(CLI::App& bench, std::function<int()>& run) {
   auto* command = bench.add_subcommand("faults", "Replays with faults in the streams");
   auto request = std::make_shared<FaultsRequest>();
-  command->add_option("folder", request->folder, "folder with the recordings and maps")->capture_default_str();
-  command->add_option("--replays", request->replays, "number of replays")->check(CLI::Range(1, 100000))->capture_default_str();
-  command->add_option("--threads", request->threads, "replays at a time")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_option("folder", request->folder, "folder with the recordings and maps")
+      ->capture_default_str();
+  command->add_option("--replays", request->replays, "number of replays")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", request->threads, "replays at a time")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   command->add_option("--seed", request->seed, "of all random numbers")->capture_default_str();
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command->callback([=, &run] { run = [=] { return bench_faults(*request); }; });

@@ -38,8 +38,8 @@ const std::vector<Variant>& variants() {
 
 struct Figures {
   Health at_end = Health::waiting;
-  TrajectoryScore score;              ///< of the updates
-  std::optional<double> jitter_mm;    ///< of the output at the IMU's rate
+  TrajectoryScore score;            ///< of the updates
+  std::optional<double> jitter_mm;  ///< of the output at the IMU's rate
   std::vector<double> latency_ms, fuse_ms;
 };
 
@@ -81,13 +81,15 @@ Expected<Figures> measure(Streams streams, const Variant& variant, const FusionB
 void print_row(const Variant& variant, const Figures& f) {
   const TrajectoryScore& s = f.score;
   const auto relative = [](const std::optional<RelativeError>& e) { return e.value_or(RelativeError{}); };
-  std::printf("| %s | %s | %.2f | %.3f | %.1f | %.3f | %.3f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.2f / %.2f | %.2f / %.2f |\n",
-              variant.name, to_string(f.at_end), s.ate_mm.mean, s.are_deg.mean, s.ate_mm.max,
-              relative(s.over_10ms).translation_mm, relative(s.over_10ms).rotation_deg,
-              relative(s.over_100ms).translation_mm, relative(s.over_100ms).rotation_deg,
-              s.velocity_rmse_mm_s.value_or(0), s.nees6_mean.value_or(0), s.lag_ms.value_or(0),
-              f.jitter_mm.value_or(0), share(f.latency_ms, 0.5), share(f.latency_ms, 0.99),
-              share(f.fuse_ms, 0.5), share(f.fuse_ms, 0.99));
+  std::printf(
+      "| %s | %s | %.2f | %.3f | %.1f | %.3f | %.3f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.2f / %.2f "
+      "| %.2f / %.2f |\n",
+      variant.name, to_string(f.at_end), s.ate_mm.mean, s.are_deg.mean, s.ate_mm.max,
+      relative(s.over_10ms).translation_mm, relative(s.over_10ms).rotation_deg,
+      relative(s.over_100ms).translation_mm, relative(s.over_100ms).rotation_deg,
+      s.velocity_rmse_mm_s.value_or(0), s.nees6_mean.value_or(0), s.lag_ms.value_or(0),
+      f.jitter_mm.value_or(0), share(f.latency_ms, 0.5), share(f.latency_ms, 0.99), share(f.fuse_ms, 0.5),
+      share(f.fuse_ms, 0.99));
   std::fflush(stdout);
 }
 
@@ -104,8 +106,10 @@ int bench_fusion(const FusionBenchRequest& request) {
     const auto streams = load_streams(track, RunConfig{});
     if (!streams) return bad_input(streams.error());
     std::printf(
-        "\n### %s\n\n| back end | at the end | ATE mean mm | ARE mean deg | ATE max mm | RTE 10 ms mm | RRE 10 ms deg "
-        "| RTE 100 ms mm | RRE 100 ms deg | velocity mm/s | NEES/6 | lag ms | jitter mm | update p50 / p99 ms | "
+        "\n### %s\n\n| back end | at the end | ATE mean mm | ARE mean deg | ATE max mm | RTE 10 ms mm | RRE "
+        "10 ms deg "
+        "| RTE 100 ms mm | RRE 100 ms deg | velocity mm/s | NEES/6 | lag ms | jitter mm | update p50 / p99 "
+        "ms | "
         "fusion p50 / p99 ms |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         peer.name.c_str());
     for (const Variant& variant : variants()) {
@@ -122,9 +126,11 @@ int bench_fusion(const FusionBenchRequest& request) {
 void add_bench_fusion(CLI::App& bench, std::function<int()>& run) {
   auto* command = bench.add_subcommand("fusion", "Back ends side by side on the shared recordings");
   auto request = std::make_shared<FusionBenchRequest>();
-  command->add_option("folder", request->folder, "folder with the recordings and maps")->capture_default_str();
+  command->add_option("folder", request->folder, "folder with the recordings and maps")
+      ->capture_default_str();
   command->add_option("--only", request->only, "names of recordings")->delimiter(',');
-  command->add_option("--set", request->assignments, "one setting, key=value, for all")->allow_extra_args(false);
+  command->add_option("--set", request->assignments, "one setting, key=value, for all")
+      ->allow_extra_args(false);
   command->callback([=, &run] { run = [=] { return bench_fusion(*request); }; });
 }
 

@@ -16,9 +16,9 @@ namespace evpose {
 /// Settings of a run: the tracker's and the driver's.
 struct RunConfig {
   TrackerConfig tracker;
-  double packet_ms = 1;  ///< events are read in packets of this length; the result does not depend on it
+  double packet_ms = 1;     ///< events are read in packets of this length; the result does not depend on it
   bool states_imu = false;  ///< states_imu.csv: the state at each IMU sample
-  int overlays = 8;      ///< pictures of the map over the time surface in the report
+  int overlays = 8;         ///< pictures of the map over the time surface in the report
 };
 void describe(ConfigTable& table, RunConfig& config);
 

@@ -42,12 +42,14 @@ void describe(ConfigTable& table, FusionConfig& c) {
 void describe(ConfigTable& table, CalibrationConfig& c) {
   table.add("time_offset", c.time_offset, "estimate the time offset of the IMU against the camera (ekf)");
   table.add("rotation", c.rotation, "estimate the rotation of the camera in the body (ekf)");
-  table.add("start_time_sigma_s", c.start_time_sigma_s, "s", "error of the given time offset, 1 sigma", {1e-6, 1});
-  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad", "error of the given rotation, 1 sigma",
+  table.add("start_time_sigma_s", c.start_time_sigma_s, "s", "error of the given time offset, 1 sigma",
             {1e-6, 1});
+  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad",
+            "error of the given rotation, 1 sigma", {1e-6, 1});
   table.add("least_velocity_m_s", c.least_velocity_m_s, "m/s",
             "frozen while velocity changes by less over half a second ...", {0, 100});
-  table.add("least_rate_rad_s", c.least_rate_rad_s, "rad/s", "... and the angular rate by less than this", {0, 100});
+  table.add("least_rate_rad_s", c.least_rate_rad_s, "rad/s", "... and the angular rate by less than this",
+            {0, 100});
 }
 
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,

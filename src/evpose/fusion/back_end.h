@@ -17,7 +17,7 @@ enum class BackEndKind { ekf, graph, particle };
 
 /// Of BackEndKind::graph.
 struct WindowConfig {
-  double length_s = 0.1;   ///< states older than this are marginalised
+  double length_s = 0.1;    ///< states older than this are marginalised
   int optimise_every = 10;  ///< updates
   int iterations = 2;
 };

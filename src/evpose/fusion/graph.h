@@ -6,8 +6,8 @@
 
 namespace evpose {
 
-/// The paper's later stage: inter-TS fusion of the newest state at every update (eq. 5), joint optimisation of
-/// the window after every few (eq. 6), whose newest state is carried on from there.
+/// The paper's later stage: inter-TS fusion of the newest state at every update (eq. 5), joint optimisation
+/// of the window after every few (eq. 6), whose newest state is carried on from there.
 class Graph : public BackEnd {
  public:
   Graph(const Motion& motion, const WindowConfig& config);

@@ -50,8 +50,7 @@ FusionState Motion::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& 
 }
 
 void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-                    const Eigen::Vector3d& force, double dt, bool suspect,
-                    Matrix15d* transition) const {
+                    const Eigen::Vector3d& force, double dt, bool suspect, Matrix15d* transition) const {
   const Eigen::Quaterniond q_mid = before.T_map_body.q * so3::exp(0.5 * dt * rate);
   const Eigen::Matrix3d R = q_mid.toRotationMatrix();
   // The attitude error is in the body of the step's start; seen from its middle it has turned half the way.

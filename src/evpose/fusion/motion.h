@@ -24,7 +24,8 @@ class Motion {
   FusionState start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const;
 
   /// IMU model: one step between two samples in the body frame; a.t must be the state's time.
-  /// `transition`: what becomes of the state's error. A suspect step is carried out with the noise of a vehicle that nobody measures.
+  /// `transition`: what becomes of the state's error. A suspect step is carried out with the noise of a
+  /// vehicle that nobody measures.
   void step(FusionState& state, const ImuSample& a, const ImuSample& b, bool suspect = false,
             Matrix15d* transition = nullptr) const;
   /// Constant velocity: to time t >= the state's.
@@ -32,8 +33,7 @@ class Motion {
 
  private:
   void spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-              const Eigen::Vector3d& force, double dt_s, bool suspect,
-              Matrix15d* transition) const;
+              const Eigen::Vector3d& force, double dt_s, bool suspect, Matrix15d* transition) const;
 
   MotionModel model_;
   Eigen::Vector3d gravity_map_;

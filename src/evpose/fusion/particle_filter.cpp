@@ -64,8 +64,7 @@ void ParticleFilter::update(const PoseInformation& m) {
   const Matrix6d posterior = moment - mean * mean.transpose();
 
   // The rest of the state given the pose, as the prediction has it.
-  const Eigen::Matrix<double, 15, 6> regression =
-      P.ldlt().solve(state_.covariance.topRows<6>()).transpose();
+  const Eigen::Matrix<double, 15, 6> regression = P.ldlt().solve(state_.covariance.topRows<6>()).transpose();
   const Matrix15d covariance = state_.covariance - regression * (P - posterior) * regression.transpose();
   state_.covariance = 0.5 * (covariance + covariance.transpose());
   state_.add(regression * mean);

@@ -9,11 +9,11 @@
 
 namespace evpose {
 
-/// Gaussian particle filter on the pose (Kotecha and Djuric 2003): particles are drawn from the predicted pose,
-/// weighted by the measurement's likelihood, and their moments are the new pose. Velocity and biases follow by
-/// their regression on the pose (Rao-Blackwell). Particles that carry all 15 states from update to update
-/// were tried first: with 500 of them their chance correlations taught the biases false certainty.
-/// The random numbers are the same in every run.
+/// Gaussian particle filter on the pose (Kotecha and Djuric 2003): particles are drawn from the predicted
+/// pose, weighted by the measurement's likelihood, and their moments are the new pose. Velocity and biases
+/// follow by their regression on the pose (Rao-Blackwell). Particles that carry all 15 states from update to
+/// update were tried first: with 500 of them their chance correlations taught the biases false certainty. The
+/// random numbers are the same in every run.
 class ParticleFilter : public BackEnd {
  public:
   ParticleFilter(const Motion& motion, const ParticleConfig& config);

@@ -32,7 +32,7 @@ class Preintegration {
   FusionState predict(const FusionState& start, const Eigen::Vector3d& gravity_map) const;
 
   struct Residual {
-    Vector15d value;       ///< zero where end == predict(start)
+    Vector15d value;             ///< zero where end == predict(start)
     Matrix15d by_start, by_end;  ///< derivatives by the error states
   };
   Residual residual(const FusionState& start, const FusionState& end,
@@ -41,7 +41,8 @@ class Preintegration {
  private:
   Eigen::Vector3d gyro_bias_, accel_bias_;
   ImuIncrement sum_;
-  Eigen::Matrix<double, 9, 6> by_bias_ = Eigen::Matrix<double, 9, 6>::Zero();  ///< (dp, phi, dv) by (b_g, b_a)
+  Eigen::Matrix<double, 9, 6> by_bias_ =
+      Eigen::Matrix<double, 9, 6>::Zero();  ///< (dp, phi, dv) by (b_g, b_a)
   Matrix15d covariance_ = Matrix15d::Zero();
   double longest_step_s_ = 0;
   int left_out_ = 0;

@@ -66,9 +66,10 @@ TEST(Preintegration, IrregularSamplesRepeatsAndAGapAreNamedAndHarmless) {
   std::mt19937 random(3);
   std::vector<TimeNs> times{0};
   while (times.back() < kNsPerS)
-    times.push_back(std::min<TimeNs>(kNsPerS, times.back() + 500'000 + static_cast<TimeNs>(random() % 1'500'000)));
-  times.insert(times.begin() + 20, times[19]);                       // a repeated stamp
-  times.erase(times.begin() + 100, times.begin() + 106);             // a gap of about 8 ms
+    times.push_back(
+        std::min<TimeNs>(kNsPerS, times.back() + 500'000 + static_cast<TimeNs>(random() % 1'500'000)));
+  times.insert(times.begin() + 20, times[19]);            // a repeated stamp
+  times.erase(times.begin() + 100, times.begin() + 106);  // a gap of about 8 ms
   const Preintegration sum = integrate_flight(times);
   EXPECT_EQ(sum.left_out(), 1);
   EXPECT_GT(sum.longest_step_s(), 4e-3);
@@ -213,8 +214,8 @@ TEST(Preintegration, RealDroneTurnsAsMotionCaptureSaw) {
     errors_deg.push_back(turn.angularDistance(inc.dq) * 180 / M_PI);
   }
   ASSERT_GT(errors_deg.size(), 100U);
-  std::nth_element(errors_deg.begin(), errors_deg.begin() + static_cast<std::ptrdiff_t>(errors_deg.size() / 2),
-                   errors_deg.end());
+  std::nth_element(errors_deg.begin(),
+                   errors_deg.begin() + static_cast<std::ptrdiff_t>(errors_deg.size() / 2), errors_deg.end());
   EXPECT_LT(errors_deg[errors_deg.size() / 2], 0.05);  // 0.045 deg in the data's README
 }
 

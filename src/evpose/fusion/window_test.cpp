@@ -317,8 +317,7 @@ Flown fly(BackEndKind kind, MotionModel model, unsigned seed) {
     Vector6d information;
     information << 1 / 9e-6, 1 / 9e-6, 1 / 9e-6, 1e6, 1e6, 1e6;
     m.information = information.asDiagonal();
-    m.vector = m.information *
-               truth.nav.T_map_body.plus(scatter).minus(back_end->state().nav.T_map_body);
+    m.vector = m.information * truth.nav.T_map_body.plus(scatter).minus(back_end->state().nav.T_map_body);
     back_end->update(m);
     if (k <= 250) continue;
     const Vector6d e = back_end->state().nav.T_map_body.minus(truth.nav.T_map_body);
@@ -350,7 +349,8 @@ TEST(BackEnds, AllAreAccurateAndKnowHowGoodTheyAre) {
 }
 
 TEST(BackEnds, GraphAndFilterAgreeFarInsideTheirUncertainty) {
-  const Flown a = fly(BackEndKind::ekf, MotionModel::imu, 7), b = fly(BackEndKind::graph, MotionModel::imu, 7);
+  const Flown a = fly(BackEndKind::ekf, MotionModel::imu, 7),
+              b = fly(BackEndKind::graph, MotionModel::imu, 7);
   const Vector15d difference = a.end.minus(b.end);
   EXPECT_LT(difference.cwiseAbs().cwiseQuotient(a.end.covariance.diagonal().cwiseSqrt()).maxCoeff(), 0.1);
   EXPECT_GT(difference.norm(), 0);  // they are not the same computation

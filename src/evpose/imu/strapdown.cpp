@@ -33,8 +33,7 @@ NavState strapdown(const NavState& state, const ImuSample& a, const ImuSample& b
   NavState out;
   out.T_map_body.q = (q * step.dq).normalized();
   out.velocity = state.velocity + q * step.dv + dt * gravity_map;
-  out.T_map_body.p =
-      state.T_map_body.p + dt * state.velocity + q * step.dp + 0.5 * dt * dt * gravity_map;
+  out.T_map_body.p = state.T_map_body.p + dt * state.velocity + q * step.dp + 0.5 * dt * dt * gravity_map;
   return out;
 }
 

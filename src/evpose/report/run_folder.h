@@ -42,11 +42,11 @@ struct RunOutcome {
   std::string report;                    ///< path of report.html
 };
 
-/// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, if wanted states_imu.csv, latency.csv,
-/// summary.json, config.yaml and report.html. It is made under a temporary name beside its place and moved there when all
-/// is written, so that nothing is changed by a run that fails. The same estimates give the same bytes, but
-/// for what depends on wall time: latency.csv, report.html, and "latency", "resources" and "rate_mev_s" in
-/// summary.json.
+/// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, if wanted states_imu.csv,
+/// latency.csv, summary.json, config.yaml and report.html. It is made under a temporary name beside its place
+/// and moved there when all is written, so that nothing is changed by a run that fails. The same estimates
+/// give the same bytes, but for what depends on wall time: latency.csv, report.html, and "latency",
+/// "resources" and "rate_mev_s" in summary.json.
 class RunFolder {
  public:
   /// Errors: the place's parent does not exist or cannot be written; something stands there that is not an

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::array<const char*, 6> kAxes{"gyroscope x",     "gyroscope y",     "gyroscope z",
                                            "accelerometer x", "accelerometer y", "accelerometer z"};
-constexpr double kForget_s = 10;  // samples are taken at most so far ahead of their use
-constexpr double kRegular = 2;          // intervals up to so many usual ones teach the usual one
+constexpr double kForget_s = 10;          // samples are taken at most so far ahead of their use
+constexpr double kRegular = 2;            // intervals up to so many usual ones teach the usual one
 constexpr double kLeastClip[] = {1, 15};  // rad/s, m/s^2: smaller readings are not taken as clipped
 
 double axis(const ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 3]; }
@@ -21,15 +21,18 @@ double axis(const ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 
 
 void describe(ConfigTable& table, ImuWatchConfig& c) {
   table.add("gap_periods", c.gap_periods, "", "an interval of so many usual ones is a gap", {1.5, 1e6});
-  table.add("gyro_range_rad_s", c.gyro_range_rad_s, "rad/s", "readings from here on are saturated", {0.1, 1e6});
+  table.add("gyro_range_rad_s", c.gyro_range_rad_s, "rad/s", "readings from here on are saturated",
+            {0.1, 1e6});
   table.add("accel_range_m_s2", c.accel_range_m_s2, "m/s^2", "readings from here on are saturated", {1, 1e6});
   table.add("clipped_samples", c.clipped_samples, "", "equal largest readings that are saturation", {2, 1e6});
-  table.add("stuck_samples", c.stuck_samples, "", "equal readings of one axis that are a stuck sensor", {3, 1e6});
+  table.add("stuck_samples", c.stuck_samples, "", "equal readings of one axis that are a stuck sensor",
+            {3, 1e6});
   table.add("remember_s", c.remember_s, "s", "a fault is told so long after its last sign", {0, 100});
 }
 
 void ImuWatch::tell(TimeNs t, std::string what) {
-  while (!told_.empty() && to_seconds(t - told_.front().t) > kForget_s + config_.remember_s) told_.pop_front();
+  while (!told_.empty() && to_seconds(t - told_.front().t) > kForget_s + config_.remember_s)
+    told_.pop_front();
   if (!told_.empty() && told_.back().t >= t) return;  // the first sign of one instant is kept
   told_.push_back({t, std::move(what)});
 }
@@ -64,8 +67,8 @@ std::optional<CheckedImu> ImuWatch::take(const ImuSample& s) {
     const double value = axis(s, i), magnitude = std::abs(value);
     equal_[k] = value == axis(last_, i) ? equal_[k] + 1 : 0;
     const double range = i < 3 ? config_.gyro_range_rad_s : config_.accel_range_m_s2;
-    const bool clipped = equal_[k] + 1 >= config_.clipped_samples && magnitude >= largest_[k] &&
-                         magnitude > kLeastClip[i / 3];
+    const bool clipped =
+        equal_[k] + 1 >= config_.clipped_samples && magnitude >= largest_[k] && magnitude > kLeastClip[i / 3];
     largest_[k] = std::max(largest_[k], magnitude);
     if (magnitude >= range || clipped) {
       out.suspect = true;

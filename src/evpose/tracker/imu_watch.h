@@ -16,9 +16,9 @@ struct ImuWatchConfig {
   double gap_periods = 3.5;         ///< an interval of so many usual ones is a gap
   double gyro_range_rad_s = 34.9;   ///< readings from here on are saturated: 2000 deg/s
   double accel_range_m_s2 = 156.9;  ///< 16 g
-  int clipped_samples = 4;          ///< so many equal readings at the largest value yet: saturated below its range
-  int stuck_samples = 20;           ///< so many equal readings of one axis while others change: stuck
-  double remember_s = 0.05;         ///< a fault is told so long after its last sign
+  int clipped_samples = 4;   ///< so many equal readings at the largest value yet: saturated below its range
+  int stuck_samples = 20;    ///< so many equal readings of one axis while others change: stuck
+  double remember_s = 0.05;  ///< a fault is told so long after its last sign
 };
 void describe(ConfigTable& table, ImuWatchConfig& config);
 

@@ -137,9 +137,7 @@ void Tracker::consume(const EventPacket& packet, std::size_t* from) {
   }
 }
 
-TimeNs Tracker::imu_time(TimeNs t) const {
-  return t + from_seconds(fusion_->calibration().time_offset_s);
-}
+TimeNs Tracker::imu_time(TimeNs t) const { return t + from_seconds(fusion_->calibration().time_offset_s); }
 
 bool Tracker::imu_reaches(TimeNs t) const {
   return setup_.motion != MotionModel::imu || (!imu_.empty() && imu_.back().sample.t >= t);

@@ -131,8 +131,8 @@ class Tracker {
   std::function<void(const Update&)> callback_;
   std::function<void(const FusionState&)> state_callback_;
   ImuWatch imu_watch_;
-  FusionState ahead_;               ///< the state at the last sample told
-  ImuSample told_;                  ///< that sample; its time is ahead_'s
+  FusionState ahead_;  ///< the state at the last sample told
+  ImuSample told_;     ///< that sample; its time is ahead_'s
   std::deque<CheckedImu> to_tell_;
 
   Eigen::Quaterniond given_q_body_cam_;

@@ -10,8 +10,10 @@
 namespace evpose {
 
 void describe(ConfigTable& table, FusionConfig& c) {
-  table.add("kind", c.kind, {{"ekf", BackEndKind::ekf}},
-            "framework of the fusion: error-state Kalman filter");
+  table.add(
+      "kind", c.kind,
+      {{"ekf", BackEndKind::ekf}, {"graph", BackEndKind::graph}, {"particle", BackEndKind::particle}},
+      "framework of the fusion: error-state Kalman filter, factor graph over a window, particle filter");
   table.add("gravity_x", c.gravity_map.x(), "m/s^2", "gravity in the map frame", {-20, 20});
   table.add("gravity_y", c.gravity_map.y(), "m/s^2", "gravity in the map frame", {-20, 20});
   table.add("gravity_z", c.gravity_map.z(), "m/s^2", "gravity in the map frame", {-20, 20});

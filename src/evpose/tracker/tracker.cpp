@@ -25,6 +25,26 @@ VisibleSetConfig spread(const TrackerConfig& config) {
   return out;
 }
 
+/// An IMU that is silent for longer is not waited for.
+constexpr TimeNs kImuPatience = 50 * kNsPerMs;
+
+/// If no sample is near after t, puts one at t that repeats the last reading, to be distrusted. True if so.
+/// Which samples have arrived beyond the patience makes no difference.
+bool bridge(std::deque<CheckedImu>& imu, TimeNs t, const FusionState& state, const Eigen::Vector3d& gravity_map) {
+  const auto next =
+      std::find_if(imu.begin(), imu.end(), [t](const CheckedImu& s) { return s.sample.t >= t; });
+  if (next != imu.end() && next->sample.t <= t + kImuPatience) return false;
+  CheckedImu held;
+  if (next == imu.begin())
+    held.sample = {t, state.gyro_bias, state.accel_bias - state.nav.T_map_body.q.conjugate() * gravity_map};
+  else
+    held = *(next - 1);
+  held.sample.t = t;
+  held.suspect = true;
+  imu.insert(next, held);
+  return true;
+}
+
 double median(std::vector<double>& values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -91,7 +111,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
 void Tracker::add_imu(const ImuSample& sample) {
   if (setup_.motion != MotionModel::imu) return;
   const auto checked = imu_watch_.take(sample);
-  if (!checked) return;
+  if (!checked || (!imu_.empty() && sample.t <= imu_.back().sample.t)) return;
   imu_.push_back(*checked);
   if (state_callback_) to_tell_.push_back(*checked);
   // Before the start only the last sample matters.
@@ -132,7 +152,9 @@ void Tracker::consume(const EventPacket& packet, std::size_t* from) {
     // An event after the update's time proves that all events up to it are here.
     *from += feed(packet, *from, next_update_);
     if (*from == packet.events.size()) return;
-    if (!imu_reaches(imu_time(next_update_))) return;
+    const EventPacket& newest = waiting_.empty() ? packet : waiting_.back();
+    const bool overdue = newest.time(newest.events.back()) > next_update_ + kImuPatience;
+    if (!imu_reaches(imu_time(next_update_)) && !overdue) return;
     make_update();
   }
 }
@@ -282,7 +304,10 @@ Update Tracker::update(TimeNs t) {
   const double span_s = to_seconds(t - last_update_);
   last_update_ = t;
   const double t0 = now();
-  predict(std::max(imu_time(t), fusion_->state().t));
+  const TimeNs until = std::max(imu_time(t), fusion_->state().t);
+  const bool blind = setup_.motion == MotionModel::imu &&
+                     bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
+  predict(until);
   const Pose predicted = fusion_->state().nav.T_map_body;
   const double t1 = now();
 
@@ -297,7 +322,7 @@ Update Tracker::update(TimeNs t) {
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
   evidence.refused = refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
-  evidence.imu_fault = imu_watch_.fault(t);
+  evidence.imu_fault = blind ? "no IMU samples" : imu_watch_.fault(t);
   if (evidence.accepted) fusion_->update(stpe.measurement);  // eq. (5) for the newest state
   setup_.T_body_cam.q = fusion_->calibration().turn * given_q_body_cam_;
 

@@ -30,7 +30,8 @@ constexpr TimeNs kImuPatience = 50 * kNsPerMs;
 
 /// If no sample is near after t, puts one at t that repeats the last reading, to be distrusted. True if so.
 /// Which samples have arrived beyond the patience makes no difference.
-bool bridge(std::deque<CheckedImu>& imu, TimeNs t, const FusionState& state, const Eigen::Vector3d& gravity_map) {
+bool bridge(std::deque<CheckedImu>& imu, TimeNs t, const FusionState& state,
+            const Eigen::Vector3d& gravity_map) {
   const auto next =
       std::find_if(imu.begin(), imu.end(), [t](const CheckedImu& s) { return s.sample.t >= t; });
   if (next != imu.end() && next->sample.t <= t + kImuPatience) return false;

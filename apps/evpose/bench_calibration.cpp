@@ -34,7 +34,13 @@ Status run_one(const PeerRecording& peer, Streams streams, const Spoilt& spoilt)
   // The given rotation is turned back, so that the true one is turn * given.
   const Eigen::Vector3d turn = spoilt.turn_deg * (M_PI / 180);
   Eigen::Quaterniond& given = streams.job.setup.T_body_cam.q;
+  const Pose T_map_cam = streams.job.start.T_map_body * streams.job.setup.T_body_cam;
   given = so3::exp(-turn) * given;
+  if (turned) {
+    // The start is where the camera was seen to be; the body's attitude is as wrong as the calibration.
+    streams.job.start.T_map_body = T_map_cam * streams.job.setup.T_body_cam.inverse();
+    streams.job.config.tracker.fusion.start_rotation_sigma_rad = calibration.start_rotation_sigma_rad;
+  }
   auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start);
   if (!tracker) return tracker.error();
   Health at_end = Health::waiting;

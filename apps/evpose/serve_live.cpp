@@ -111,7 +111,7 @@ class Outputs {
 
   Status open(const ServeRequest& request, const ServeConfig& config, const TrackJob& job) {
     if (request.view >= 0) {
-      auto viewer = Viewer::start({config.view_address, request.view}, job.recording.name, job.map);
+      auto viewer = Viewer::start({config.view_address, request.view}, job.recording.name, *job.map);
       if (!viewer) return viewer.error();
       viewer_ = std::move(*viewer);
       std::fprintf(stderr, "evpose: open %s in a browser\n", viewer_->address().c_str());

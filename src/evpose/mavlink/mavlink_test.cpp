@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
-#include <stdlib.h>
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <random>
 #include <string>
 

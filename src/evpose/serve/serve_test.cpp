@@ -40,13 +40,16 @@ StreamItem imu_item(TimeNs t) {
 // ---- queue ----
 
 TEST(StreamQueue, NothingIsShedFromWhatIsTakenInTime) {
-  StreamQueue queue({});
+  QueueConfig config;
+  config.thin_after_ms = config.drop_after_ms = 1e5;  // however busy this machine is
+  StreamQueue queue(config);
   for (int i = 0; i < 100; ++i) {
     ASSERT_TRUE(queue.push(events_item(packet_at(i * kNsPerMs, 1000))));
     StreamItem item;
     ASSERT_TRUE(queue.pop(item, kNsPerS));
     EXPECT_EQ(item.events.base, i * kNsPerMs);
     EXPECT_EQ(item.events.events.size(), 1000u);
+    EXPECT_EQ(item.stride, 1);
   }
   EXPECT_EQ(queue.counts().events_shed, 0u);
 }
@@ -86,6 +89,7 @@ TEST(StreamQueue, WhatWaitedLongerIsThinnedMore) {
   StreamItem item;
   ASSERT_TRUE(queue.pop(item, 0));
   EXPECT_LT(item.events.events.size(), 250u);  // at most one of 51
+  EXPECT_EQ(item.stride, 30) << "and few updates are made";
   EXPECT_EQ(item.events.events.size() + queue.counts().events_shed, 10'000u);
 }
 
@@ -343,6 +347,19 @@ TEST_F(SessionStory, AnImuThatStopsIsNamedAndSurvivedAndEventsAreShed) {
   feed(s, 3 * kNsPerS, 4 * kNsPerS);
   EXPECT_EQ(restarts_.size(), 1u);
   EXPECT_NEAR(static_cast<double>(updates_.size()), 298, 3);
+}
+
+TEST_F(SessionStory, UpdatesThatCannotBeMadeInTimeAreLeftOutEvenly) {
+  Session s = session();
+  for (TimeNs t = 0; t < kNsPerS; t += kNsPerMs) {
+    StreamItem sample = imu_item(t), item = events_item(packet_at(t, 100, 9));
+    s.take(sample, t);
+    item.stride = 3;
+    s.take(item, t);
+  }
+  ASSERT_NEAR(static_cast<double>(updates_.size()), 100, 1);
+  for (std::size_t i = 2; i < updates_.size(); ++i)
+    EXPECT_NEAR(static_cast<double>(updates_[i] - updates_[i - 1]), 1e7, 2);
 }
 
 TEST_F(SessionStory, ResetGoesBackToTheStartPose) {

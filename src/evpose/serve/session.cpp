@@ -50,7 +50,7 @@ void Session::learn_offset(const StreamItem& item, TimeNs newest) {
   has_offset_ = true;
 }
 
-void Session::arrived(Stream& stream, TimeNs now_ns) {
+void Session::arrived(Stream& stream, TimeNs now_ns) const {
   stream.arrived = now_ns;
   if (!stream.stalled) return;
   stream.stalled = false;
@@ -121,6 +121,7 @@ void Session::take(StreamItem& item, TimeNs now_ns) {
         return;
       }
       learn_offset(item, item.events.time(item.events.events.back()));
+      if (tracker_) tracker_->set_update_stride(item.stride);
       return take_events(item.events, now_ns);
     case StreamItem::Kind::imu:
       return take_imu(item.imu, now_ns);

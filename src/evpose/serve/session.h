@@ -68,7 +68,7 @@ class Session {
   void take_imu(const std::vector<ImuSample>& samples, TimeNs now_ns);
   /// Whether data of time `t` follow; if the clock jumped, the tracker is given up first.
   bool follows(Stream& stream, TimeNs t);
-  void arrived(Stream& stream, TimeNs now_ns);
+  void arrived(Stream& stream, TimeNs now_ns) const;
   void check_stall(Stream& stream, TimeNs now_ns);
   void restart(const std::string& why, bool from_last);
   bool begin(TimeNs first_event);

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kMostImu = 200'000;   // samples: a minute and more of the fastest IMU
 constexpr std::size_t kMostItems = 50'000;  // of any kind
+constexpr int kMostStride = 30;             // ten updates a second are left of 300
 
 TimeNs now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -74,12 +75,13 @@ bool StreamQueue::pop(StreamItem& item, TimeNs timeout_ns) {
   items_.pop_front();
   waiting_events_ -= item.events.events.size(), waiting_imu_ -= item.imu.size();
   emptied_.notify_one();
-  if (config_.shed && item.kind == StreamItem::Kind::events) thin(item, now_ns() - item.arrived_ns);
+  if (config_.shed && item.kind == StreamItem::Kind::events) relieve(item, now_ns() - item.arrived_ns);
   return true;
 }
 
-void StreamQueue::thin(StreamItem& item, TimeNs waited_ns) {
+void StreamQueue::relieve(StreamItem& item, TimeNs waited_ns) {
   const double waited_ms = 1e3 * to_seconds(waited_ns);
+  item.stride = std::min(kMostStride, 1 + static_cast<int>(waited_ms / (0.5 * config_.thin_after_ms)));
   if (waited_ms <= config_.thin_after_ms) return;
   std::vector<Event>& events = item.events.events;
   std::size_t kept = 0;

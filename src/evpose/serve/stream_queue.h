@@ -27,6 +27,7 @@ struct StreamItem {
   /// The machine's monotone clock less the data's, where the source knows it.
   std::optional<TimeNs> data_to_monotonic;
   TimeNs arrived_ns = 0;  ///< monotone clock; set by the queue
+  int stride = 1;         ///< of events; set by the queue: it keeps up with no more than every n-th update
 };
 
 struct QueueConfig {
@@ -38,7 +39,8 @@ struct QueueConfig {
 void describe(ConfigTable& table, QueueConfig& config);
 
 /// Between the thread of a source and that of the tracker. Under overload it sheds events, never IMU samples,
-/// so that the newest pose stays timely: every k-th event of a packet is kept, which is fair over the image.
+/// so that the newest pose stays timely: every k-th event of a packet is kept, which is fair over the image,
+/// and every k-th update is made.
 class StreamQueue {
  public:
   explicit StreamQueue(const QueueConfig& config) : config_(config) {}
@@ -59,7 +61,7 @@ class StreamQueue {
 
  private:
   void make_room();
-  void thin(StreamItem& item, TimeNs waited_ns);
+  void relieve(StreamItem& item, TimeNs waited_ns);
 
   QueueConfig config_;
   mutable std::mutex mutex_;

@@ -168,7 +168,7 @@ bool Tracker::imu_reaches(TimeNs t) const {
 
 void Tracker::make_update() {
   const Update result = update(next_update_);
-  ++update_number_;
+  update_number_ += update_stride_;
   next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
   if (callback_) callback_(result);
   if (!state_callback_ || setup_.motion != MotionModel::imu) return;

@@ -76,6 +76,9 @@ class Tracker {
   /// All events up to t have been added: updates up to t need not wait for a later event.
   void events_complete_until(TimeNs t);
 
+  /// After the next update only every n-th is made: for a driver that cannot keep up. 1: all.
+  void set_update_stride(int n) { update_stride_ = n; }
+
   const EventFront& events() const { return front_; }
   /// What the fusion found to be wrong with the given calibration, if it was asked to look.
   Calibration calibration() const { return fusion_->calibration(); }
@@ -137,7 +140,7 @@ class Tracker {
 
   Eigen::Quaterniond given_q_body_cam_;
   TimeNs start_t_, last_update_;
-  std::int64_t update_number_ = 0;
+  std::int64_t update_number_ = 0, update_stride_ = 1;
   TimeNs next_update_ = 0;
   std::deque<CheckedImu> imu_;       ///< from the state's time on; the first is at it once started
   std::deque<EventPacket> waiting_;  ///< events that arrived before their IMU samples

@@ -33,9 +33,9 @@ class Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  void say(const std::string& words) { ::send(descriptor_, words.data(), words.size(), MSG_NOSIGNAL); }
+  void say(const std::string& words) const { ::send(descriptor_, words.data(), words.size(), MSG_NOSIGNAL); }
   /// What comes until the text has been seen, or the end.
-  std::string hear(const std::string& until = "") {
+  std::string hear(const std::string& until = "") const {
     std::string out;
     char buffer[4096];
     while (until.empty() || out.find(until) == std::string::npos) {

@@ -82,13 +82,13 @@ std::string history_json(const std::string& mode, const std::string& title,
 }
 
 Expected<std::unique_ptr<Viewer>> Viewer::start(const ServerConfig& config, const std::string& title,
-                                                std::shared_ptr<const ContourMap> map) {
+                                                const ContourMap& map) {
   std::unique_ptr<Viewer> viewer(new Viewer(title));
   auto server = Server::start(config);
   if (!server) return server.error();
   viewer->server_ = std::move(*server);
   set_viewer_pages(*viewer->server_, "live");
-  viewer->server_->set_page("/scene.json", "application/json", scene_json(map.get()));
+  viewer->server_->set_page("/scene.json", "application/json", scene_json(&map));
   viewer->server_->set_page("/history.json", "application/json", [raw = viewer.get()] {
     std::vector<ViewRow> rows;
     {

@@ -31,7 +31,7 @@ std::string history_json(const std::string& mode, const std::string& title, cons
 class Viewer {
  public:
   static Expected<std::unique_ptr<Viewer>> start(const ServerConfig& config, const std::string& title,
-                                                 std::shared_ptr<const ContourMap> map);
+                                                 const ContourMap& map);
 
   /// An update of `tracker`. `delay_ms`: from its instant to now.
   void add(const Update& update, const Tracker& tracker, double delay_ms);

@@ -26,7 +26,14 @@ velocity = (truth[1, 1:4] - truth[0, 1:4]) / (truth[1, 0] - truth[0, 0])
 tracker = evpose.Tracker(map=map_path, calibration=str(folder / "camchain-imucam.yaml"), T_map_body=start,
                          t_ns=round(truth[0, 0] * 1e9), velocity=velocity, imu_model=str(folder / "imu.yaml"))
 rows = []
-tracker.on_update(lambda u: rows.append((u.t_ns * 1e-9, *u.position, *u.quaternion)) if u.health == "tracking" else None)
+
+
+def keep(update):
+    if update.health not in ("waiting", "lost"):
+        rows.append((update.t_ns * 1e-9, *update.position, *update.quaternion))
+
+
+tracker.on_update(keep)
 
 with h5py.File(folder / "events.h5") as file:
     t, px, py, p = (file["events/" + name][:] for name in ("t", "x", "y", "p"))

@@ -20,6 +20,10 @@ foreach(library lz4 zstd blosc)  # no CMake packages in Debian 12
   target_link_libraries(evpose_${library} INTERFACE ${EVPOSE_${library}_LIBRARY})
   set_target_properties(evpose_${library} PROPERTIES EXPORT_NAME ${library})
 endforeach()
+# Headers only; its own CMake file asks for more of them than Debian installs elsewhere.
+find_path(EVPOSE_nanoflann_INCLUDE nanoflann.hpp REQUIRED)
+add_library(evpose_nanoflann INTERFACE)
+target_include_directories(evpose_nanoflann SYSTEM INTERFACE ${EVPOSE_nanoflann_INCLUDE})
 if(EVPOSE_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)

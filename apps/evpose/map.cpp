@@ -70,6 +70,8 @@ void add_map(CLI::App& app, std::function<int()>& run) {
 };
 }  // namespace evpose
 );
+add_map_build(*map, run);
+add_map_compare(*map, run);
 auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
 info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
 info->callback([o, &run] { run = [o] { return print_map(o->input); }; });

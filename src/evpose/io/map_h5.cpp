@@ -7,6 +7,7 @@
 #include "evpose/io/crc32.h"
 #include "evpose/io/hdf5_file.h"
 #include "evpose/io/map_h5_meta.h"
+#include "evpose/map/triangulation.h"
 
 namespace evpose {
 namespace {
@@ -149,6 +150,8 @@ Status read_points(const Hdf5File& file, Reader& reader, ContourMap& map) {
   const auto rows = static_cast<std::int64_t>(xyz.size() / 3);
   const auto tangent = reader.column<float>("/points/tangent", 3, rows);
   const auto normal = reader.column<float>("/points/normal_a", 3, rows);
+  const bool has_b = file.has("/points/normal_b");
+  const auto normal_b = has_b ? reader.column<float>("/points/normal_b", 3, rows) : std::vector<float>();
   const bool own_sigma = file.has("/points/sigma");
   const auto sigma = own_sigma ? reader.column<float>("/points/sigma", 1, rows) : std::vector<float>();
   if (!reader.status()) return reader.status();
@@ -158,6 +161,7 @@ Status read_points(const Hdf5File& file, Reader& reader, ContourMap& map) {
     p.position = row3(xyz, i);
     p.tangent = row3(tangent, i);
     p.normal = row3(normal, i);
+    if (has_b) p.normal_b = row3(normal_b, i);
     if (own_sigma) p.sigma = std::max(sigma[i], 0.0F);
   }
   return {};
@@ -240,6 +244,47 @@ Status read_mesh(const Hdf5File& file, Reader& reader, TriangleMesh& mesh) {
   return {};
 }
 
+Status read_planes(const Hdf5File& file, Reader& reader, ContourMap& map) {
+  if (!file.has("/planes/d")) return {};
+  const auto d = reader.column<double>("/planes/d", 1, -1);
+  const auto rows = static_cast<std::int64_t>(d.size());
+  const auto normal = reader.column<float>("/planes/normal", 3, rows);
+  const auto inliers = reader.column<std::uint32_t>("/planes/inliers", 1, rows);
+  const auto rms = reader.column<float>("/planes/rms", 1, rows);
+  if (!reader.status()) return reader.status();
+  for (std::size_t i = 0; i < d.size(); ++i)
+    map.planes.push_back({row3(normal, i), d[i], inliers[i], rms[i]});
+  return {};
+}
+
+Status read_polygons(const Hdf5File& file, Reader& reader, ContourMap& map) {
+  if (!file.has("/polygons/start")) return {};
+  const auto vertices = reader.column<float>("/polygons/vertices", 3, -1);
+  const auto start = reader.column<std::uint64_t>("/polygons/start", 1, -1);
+  const auto rows = static_cast<std::int64_t>(start.size());
+  const auto count = reader.column<std::uint32_t>("/polygons/count", 1, rows);
+  const auto plane = reader.column<std::int32_t>("/polygons/plane", 1, rows);
+  const auto hole_of = reader.column<std::int32_t>("/polygons/hole_of", 1, rows);
+  if (!reader.status()) return reader.status();
+  const std::string where = file.path() + ": /polygons";
+  const auto planes = static_cast<std::int64_t>(map.planes.size());
+  for (std::size_t g = 0; g < start.size(); ++g) {
+    if (start[g] > vertices.size() / 3 || count[g] > vertices.size() / 3 - start[g])
+      return Error{where, text("row ", g, " reaches beyond the ", vertices.size() / 3, " vertices"),
+                   kDamaged};
+    if (plane[g] < -1 || plane[g] >= planes)
+      return Error{where, text("row ", g, " names plane ", plane[g], " of ", planes), kDamaged};
+    if (hole_of[g] < -1 || hole_of[g] >= rows)
+      return Error{where, text("row ", g, " is a hole of row ", hole_of[g], " of ", rows), kDamaged};
+    MapPolygon polygon;
+    polygon.plane = plane[g];
+    polygon.hole_of = hole_of[g];
+    for (std::size_t i = 0; i < count[g]; ++i) polygon.vertices.push_back(row3(vertices, start[g] + i));
+    map.polygons.push_back(std::move(polygon));
+  }
+  return {};
+}
+
 Status check_whole(const Hdf5File& file) {
   const auto stored = file.attribute_numbers("/meta", "crc");
   if (!stored || stored->size() != 1)
@@ -262,7 +307,10 @@ Expected<ContourMap> read_map_h5(const std::string& path) {
   if (auto status = read_points(*file, reader, map); !status) return status.error();
   if (auto status = read_contours(*file, reader, map); !status) return status.error();
   if (auto status = read_mesh(*file, reader, map.occluders); !status) return status.error();
+  if (auto status = read_planes(*file, reader, map); !status) return status.error();
+  if (auto status = read_polygons(*file, reader, map); !status) return status.error();
   if (auto status = check_whole(*file); !status) return status.error();
+  if (map.occluders.triangles.empty()) map.occluders = triangulated(map.planes, map.polygons);
   return map;
 }
 

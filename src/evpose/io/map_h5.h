@@ -8,14 +8,16 @@
 
 namespace evpose {
 
-/// map.h5 1.0: contours, points and the mesh of occluders. A contour of one row is an isolated point, as is a
-/// row that belongs to no contour; lengths of points are shares of their contour's. Errors: not a map file,
-/// another major version or unit, an unknown required feature, a dataset whose checksum, shape or content is
-/// wrong (named).
+/// map.h5 1.0: contours, points, planes with their polygons and the mesh of occluders; without a mesh the
+/// polygons are the occluders, triangulated. A contour of one row is an isolated point, as is a row that
+/// belongs to no contour; lengths of points are shares of their contour's. Errors: not a map file, another
+/// major version or unit, an unknown required feature, a dataset whose checksum, shape or content is wrong
+/// (named).
 Expected<ContourMap> read_map_h5(const std::string& path);
 
 /// Contours are numbered anew, in the order of their first points; points of one contour that differ in kind,
-/// planes or contrast become several. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes.
+/// planes or contrast become several. The mesh of occluders is written unless there are polygons to make it
+/// of. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes.
 Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc = "");
 
 }  // namespace evpose

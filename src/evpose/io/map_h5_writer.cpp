@@ -72,7 +72,7 @@ Columns columns_of(const ContourMap& map) {
     append(c.xyz, p.position);
     append(c.tangent, p.tangent);
     append(c.normal_a, p.normal);
-    append(c.normal_b, Eigen::Vector3f::Zero());
+    append(c.normal_b, p.normal_b);
     c.point_sigma.push_back(p.sigma);
     before = &p;
   }
@@ -97,6 +97,8 @@ class Writer {
   }
 
   Status contours(const Columns& c);
+  Status planes(const std::vector<MapPlane>& planes);
+  Status polygons(const std::vector<MapPolygon>& polygons);
   Status mesh(const TriangleMesh& mesh);
   Status meta(const ContourMap& map, const std::string& created_utc);
   Status close();
@@ -127,6 +129,45 @@ Status Writer::contours(const Columns& c) {
                         dataset("/points/normal_a", NumberType::f32, c.normal_a, 3),
                         dataset("/points/normal_b", NumberType::f32, c.normal_b, 3),
                         dataset("/points/sigma", NumberType::f32, c.point_sigma)});
+}
+
+Status Writer::planes(const std::vector<MapPlane>& planes) {
+  if (planes.empty()) return {};
+  std::vector<float> normal, rms;
+  std::vector<double> d;
+  std::vector<std::uint32_t> inliers;
+  for (const MapPlane& plane : planes) {
+    append(normal, plane.normal);
+    d.push_back(plane.d);
+    inliers.push_back(plane.inliers);
+    rms.push_back(plane.rms);
+  }
+  return first_failure({file_.make_group("/planes"), dataset("/planes/normal", NumberType::f32, normal, 3),
+                        dataset("/planes/d", NumberType::f64, d),
+                        dataset("/planes/inliers", NumberType::u32, inliers),
+                        dataset("/planes/rms", NumberType::f32, rms)});
+}
+
+Status Writer::polygons(const std::vector<MapPolygon>& polygons) {
+  if (polygons.empty()) return {};
+  std::vector<float> vertices;
+  std::vector<std::uint64_t> start;
+  std::vector<std::uint32_t> count;
+  std::vector<std::int32_t> plane, hole_of;
+  for (const MapPolygon& polygon : polygons) {
+    start.push_back(vertices.size() / 3);
+    count.push_back(static_cast<std::uint32_t>(polygon.vertices.size()));
+    plane.push_back(polygon.plane);
+    hole_of.push_back(polygon.hole_of);
+    for (const auto& v : polygon.vertices) append(vertices, v);
+  }
+  const std::vector<std::uint8_t> double_sided(polygons.size(), 1);
+  return first_failure(
+      {file_.make_group("/polygons"), dataset("/polygons/vertices", NumberType::f32, vertices, 3),
+       dataset("/polygons/start", NumberType::u64, start), dataset("/polygons/count", NumberType::u32, count),
+       dataset("/polygons/plane", NumberType::i32, plane),
+       dataset("/polygons/hole_of", NumberType::i32, hole_of),
+       dataset("/polygons/double_sided", NumberType::u8, double_sided)});
 }
 
 Status Writer::mesh(const TriangleMesh& mesh) {
@@ -181,7 +222,9 @@ Status write_map_h5(const std::string& path, const ContourMap& map, const std::s
   auto file = Hdf5File::create(*temporary);
   if (!file) return file.error();
   Writer writer(*std::move(file));
-  if (auto status = first_failure({writer.contours(columns_of(map)), writer.mesh(map.occluders),
+  if (auto status = first_failure({writer.contours(columns_of(map)), writer.planes(map.planes),
+                                   writer.polygons(map.polygons),
+                                   map.polygons.empty() ? writer.mesh(map.occluders) : Status(),
                                    writer.meta(map, created_utc), writer.close()});
       !status)
     return status;

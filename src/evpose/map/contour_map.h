@@ -24,6 +24,23 @@ struct ContourPoint {
   std::int32_t plane_a = -1, plane_b = -1;  ///< adjacent planes, -1: none
   ContourKind kind = ContourKind::unknown;
   std::int8_t contrast = 0;  ///< brightness step when crossing along normal: -1, 0, +1
+  Eigen::Vector3f normal_b = Eigen::Vector3f::Zero();  ///< as normal, in plane b; zero: none or unknown
+};
+
+/// A flat surface of the map: normal . x + d = 0 with x relative to ContourMap::anchor.
+struct MapPlane {
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< unit, towards the free side where that is known
+  double d = 0;                                       ///< metres
+  std::uint32_t inliers = 0;                          ///< points that it was fitted to
+  float rms = 0;                                      ///< of these across it, metres
+};
+
+/// A closed line around a surface or around a hole in it. Vertices relative to ContourMap::anchor, metres,
+/// not repeated at the end; counter-clockwise seen from where the plane's normal points to, holes clockwise.
+struct MapPolygon {
+  std::vector<Eigen::Vector3f> vertices;
+  std::int32_t plane = -1;
+  std::int32_t hole_of = -1;  ///< polygon that it cuts, -1: outer ring
 };
 
 /// Surfaces that hide contours behind them. Vertices relative to ContourMap::anchor, metres.
@@ -37,9 +54,11 @@ struct TriangleMesh {
 struct ContourMap {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< map frame, metres
   std::vector<ContourPoint> points;
-  TriangleMesh occluders;     ///< empty: nothing is hidden
-  std::string frame = "map";  ///< name of the map frame
-  std::string source;         ///< file it was read from, for messages
+  std::vector<MapPlane> planes;
+  std::vector<MapPolygon> polygons;  ///< of the planes; they hide what is behind (triangulated())
+  TriangleMesh occluders;            ///< empty: nothing is hidden
+  std::string frame = "map";         ///< name of the map frame
+  std::string source;                ///< file it was read from, for messages
 
   Eigen::Vector3d position(std::size_t i) const { return anchor + points[i].position.cast<double>(); }
 };

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "commands.h"
+#include "evpose/core/config.h"
+#include "evpose/core/parallel.h"
+#include "evpose/eval/map_score.h"
+#include "evpose/io/cloud_files.h"
+#include "evpose/io/config_yaml.h"
+#include "evpose/io/contour_files.h"
+#include "evpose/io/map_h5.h"
+#include "evpose/map_build/map_builder.h"
+#include "interrupt.h"
+#include "progress.h"
+
+namespace evpose {
+namespace {
+
+struct BuildRequest {
+  std::string cloud, output = "map.h5";
+  std::vector<std::string> assignments;
+  int threads = 1;
+};
+
+int build(const BuildRequest& request) {
+  map_build::BuildConfig config;
+  ConfigTable table;
+  describe(table, config);
+  for (const std::string& assignment : request.assignments)
+    if (Status done = apply_assignment(table, assignment); !done) return bad_input(done.error());
+  const auto start = std::chrono::steady_clock::now();
+  auto cloud = read_cloud(request.cloud);
+  if (!cloud) return bad_input(cloud.error());
+  const InterruptGuard guard;
+  ThreadPool pool(request.threads);
+  Progress progress("building");
+  const auto built = map_build::build_map(*std::move(cloud), config, pool, [&](double share) {
+    progress.at(share);
+    return !InterruptGuard::interrupted();
+  });
+  progress.done();
+  if (InterruptGuard::interrupted()) return kInterruptedStatus;
+  if (!built) return bad_input(built.error());
+  if (const auto ok = write_map_h5(request.output, built->map); !ok) return bad_input(ok.error());
+  const auto& f = built->figures;
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::printf(
+      "points     %zu, %.1f cm apart, noise %.1f mm, patches of %d\n"
+      "planes     %zu hold %.1f %% of the points; %zu are facets of curved surfaces\n"
+      "creases    %.1f m\nboundaries %.1f m; %.1f m of outlines left out: soft, short or unsure\n"
+      "time       %.1f s\n",
+      f.points, 100 * f.scale.spacing_m, 1e3 * f.scale.noise_m, f.scale.neighbours, f.planes,
+      100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved, f.crease_m,
+      f.boundary_m, f.shadow_m, wall_s);
+  return 0;
+}
+
+void print_score(const char* name, const KindScore& s) {
+  std::printf("%-9s %8.1f %8.1f  %5.1f %5.1f   %5.1f %5.1f   %5.2f %5.2f %5.2f   %5.2f %5.2f  %5.2f\n", name,
+              s.built_m, s.true_m, 100 * s.precision_5mm, 100 * s.precision_10mm, 100 * s.recall_5mm,
+              100 * s.recall_10mm, s.p50_mm, s.mean_mm, s.p95_mm, s.direction_mean_deg, s.direction_p95_deg,
+              s.sigma_ratio);
+}
+
+int compare(const std::string& built_path, const std::string& true_path, const std::string& cloud_path) {
+  const auto built = read_contour_map(built_path);
+  if (!built) return bad_input(built.error());
+  const auto truth = read_contour_map(true_path);
+  if (!truth) return bad_input(truth.error());
+  PointCloud cloud;
+  if (!cloud_path.empty()) {
+    auto read = read_cloud(cloud_path);
+    if (!read) return bad_input(read.error());
+    cloud = *std::move(read);
+  }
+  const MapScore score = score_map(*built, *truth, cloud_path.empty() ? nullptr : &cloud, {});
+  std::printf(
+      "          built m   true m  precision %%    recall %%      distance mm         direction deg  error/\n"
+      "                             5 mm 10 mm    5 mm 10 mm    p50  mean   p95    mean   p95   sigma\n");
+  print_score("all", score.all);
+  print_score("crease", score.crease);
+  print_score("boundary", score.boundary);
+  std::printf(
+      "true contours that do not count: %.1f m of edges under 0.3 m, %.1f m that the cloud did not see\n",
+      score.short_m, score.unseen_m);
+  return 0;
+}
+
+}  // namespace
+
+void add_map_build(CLI::App& map, std::function<int()>& run) {
+  auto request = std::make_shared<BuildRequest>();
+  request->threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  auto* command = map.add_subcommand("build", "Make a map from a cloud of surface points (PLY, PCD, LAS)");
+  command->add_option("cloud", request->cloud, "points in metres, of one frame")->required();
+  command->add_option("-o,--output", request->output, "map file")->capture_default_str();
+  command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
+  command->add_option("--threads", request->threads, "that work; the map is the same for any number")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 256));
+  command->callback([=, &run] { run = [=] { return build(*request); }; });
+}
+
+void add_map_compare(CLI::App& map, std::function<int()>& run) {
+  auto paths = std::make_shared<std::array<std::string, 3>>();
+  auto* command = map.add_subcommand("compare", "How near the contours of a map are to the true ones");
+  command->add_option("built", (*paths)[0], "map or contours to judge")->required();
+  command->add_option("true", (*paths)[1], "true contours")->required();
+  command->add_option("--cloud", (*paths)[2],
+                      "cloud it was built from: true edges that it did not see do not count");
+  command->callback([=, &run] { run = [=] { return compare((*paths)[0], (*paths)[1], (*paths)[2]); }; });
+}
+
+}  // namespace evpose

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/eval/map_score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "evpose/io/point_grid.h"
+#include "evpose/map/point_cloud.h"
+
+namespace evpose {
+namespace {
+
+constexpr float kLink_m = 0.035F;  // true points so near to each other, in line, are of one edge
+
+std::vector<Eigen::Vector3f> positions(const ContourMap& map, const Eigen::Vector3d& anchor) {
+  std::vector<Eigen::Vector3f> out;
+  out.reserve(map.points.size());
+  for (std::size_t i = 0; i < map.points.size(); ++i) out.push_back((map.position(i) - anchor).cast<float>());
+  return out;
+}
+
+/// Length of the straight edge that each point is part of.
+std::vector<double> edge_lengths(const ContourMap& map, const std::vector<Eigen::Vector3f>& at) {
+  std::vector<std::uint32_t> parent(at.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  const PointGrid grid(at, kLink_m);
+  for (std::uint32_t i = 0; i < at.size(); ++i) {
+    const Eigen::Vector3f& t = map.points[i].tangent;
+    grid.for_candidates(at[i], [&](std::uint32_t j) {
+      const Eigen::Vector3f d = at[j] - at[i];
+      if (j <= i || d.norm() > kLink_m || std::abs(t.dot(map.points[j].tangent)) < 0.98F) return;
+      if ((d - t * t.dot(d)).norm() < 0.003F) parent[root(j)] = root(i);
+    });
+  }
+  std::vector<double> length(at.size(), 0), out(at.size());
+  for (std::uint32_t i = 0; i < at.size(); ++i) length[root(i)] += static_cast<double>(map.points[i].length);
+  for (std::uint32_t i = 0; i < at.size(); ++i) out[i] = length[root(i)];
+  return out;
+}
+
+/// A contour of one map beside a point of the other.
+struct Match {
+  double across_m = INFINITY, angle_rad = 0;
+};
+
+class Matcher {
+ public:
+  Matcher(const ContourMap& map, const std::vector<Eigen::Vector3f>& at, const MapScoreConfig& config)
+      : map_(map), at_(at), config_(config), grid_(at, static_cast<float>(config.reach_m)) {}
+
+  Match nearest(const Eigen::Vector3f& x, const Eigen::Vector3f& tangent) const {
+    Match best;
+    grid_.for_candidates(x, [&](std::uint32_t j) {
+      const Eigen::Vector3f& t = map_.points[j].tangent;
+      const double angle = std::acos(std::min(1.0, static_cast<double>(std::abs(t.dot(tangent)))));
+      if (angle > config_.direction_rad) return;
+      const Eigen::Vector3f d = x - at_[j];
+      const double along = std::abs(static_cast<double>(t.dot(d)));
+      const double across = static_cast<double>((d - t * t.dot(d)).norm());
+      if (along <= config_.reach_m && across <= config_.reach_m && across < best.across_m)
+        best = {across, angle};
+    });
+    return best;
+  }
+
+ private:
+  const ContourMap& map_;
+  const std::vector<Eigen::Vector3f>& at_;
+  const MapScoreConfig& config_;
+  PointGrid grid_;
+};
+
+/// Values with weights, to be asked for quantiles.
+struct Weighted {
+  std::vector<std::pair<double, double>> values;
+  double quantile(double share) {
+    std::sort(values.begin(), values.end());
+    double sum = 0, so_far = 0;
+    for (const auto& v : values) sum += v.second;
+    for (const auto& v : values)
+      if ((so_far += v.second) >= share * sum) return v.first;
+    return 0;
+  }
+  double mean() const {
+    double sum = 0, weight = 0;
+    for (const auto& v : values) sum += v.first * v.second, weight += v.second;
+    return weight > 0 ? sum / weight : 0;
+  }
+};
+
+struct Tally {
+  KindScore score;
+  Weighted distance, direction, ratio;
+
+  void built(const ContourPoint& p, const Match& match) {
+    const auto weight = static_cast<double>(p.length);
+    score.built_m += weight;
+    score.precision_5mm += match.across_m <= 0.005 ? weight : 0;
+    score.precision_10mm += match.across_m <= 0.010 ? weight : 0;
+    if (!std::isfinite(match.across_m)) return;
+    distance.values.emplace_back(match.across_m, weight);
+    direction.values.emplace_back(match.angle_rad, weight);
+    // Two directions across the contour share the error.
+    if (p.sigma > 0)
+      ratio.values.emplace_back(0.5 * std::pow(match.across_m / static_cast<double>(p.sigma), 2), weight);
+  }
+  void truth(double weight, const Match& match) {
+    score.true_m += weight;
+    score.recall_5mm += match.across_m <= 0.005 ? weight : 0;
+    score.recall_10mm += match.across_m <= 0.010 ? weight : 0;
+  }
+  KindScore finish() {
+    constexpr double kDegree = 180 / std::numbers::pi;
+    if (score.built_m > 0) score.precision_5mm /= score.built_m, score.precision_10mm /= score.built_m;
+    if (score.true_m > 0) score.recall_5mm /= score.true_m, score.recall_10mm /= score.true_m;
+    score.p50_mm = 1e3 * distance.quantile(0.5);
+    score.p95_mm = 1e3 * distance.quantile(0.95);
+    score.mean_mm = 1e3 * distance.mean();
+    score.direction_mean_deg = kDegree * direction.mean();
+    score.direction_p95_deg = kDegree * direction.quantile(0.95);
+    score.sigma_ratio = std::sqrt(ratio.mean());
+    return score;
+  }
+};
+
+}  // namespace
+
+MapScore score_map(const ContourMap& built, const ContourMap& truth, const PointCloud* cloud,
+                   const MapScoreConfig& config) {
+  const auto of_built = positions(built, truth.anchor), of_truth = positions(truth, truth.anchor);
+  Tally all, crease, boundary;
+  const auto of_kind = [&](ContourKind kind) -> Tally* {
+    return kind == ContourKind::crease ? &crease : kind == ContourKind::boundary ? &boundary : nullptr;
+  };
+  const Matcher in_truth(truth, of_truth, config), in_built(built, of_built, config);
+  for (std::size_t i = 0; i < of_built.size(); ++i) {
+    const ContourPoint& p = built.points[i];
+    const Match match = in_truth.nearest(of_built[i], p.tangent);
+    all.built(p, match);
+    if (Tally* tally = of_kind(p.kind)) tally->built(p, match);
+  }
+  std::vector<Eigen::Vector3f> seen;
+  if (cloud != nullptr)
+    for (const auto& p : cloud->points)
+      seen.push_back((cloud->anchor - truth.anchor + p.cast<double>()).cast<float>());
+  const auto radius = static_cast<float>(config.seen_radius_m);
+  const PointGrid seen_grid(seen, radius);
+  const auto lengths = edge_lengths(truth, of_truth);
+  MapScore out;
+  for (std::size_t i = 0; i < of_truth.size(); ++i) {
+    const ContourPoint& p = truth.points[i];
+    const auto weight = static_cast<double>(p.length);
+    if (lengths[i] < config.long_m) {
+      out.short_m += weight;
+      continue;
+    }
+    int near = 0;
+    if (cloud != nullptr)
+      seen_grid.for_candidates(
+          of_truth[i], [&](std::uint32_t j) { near += (seen[j] - of_truth[i]).norm() <= radius ? 1 : 0; });
+    if (cloud != nullptr && near < config.seen_points) {
+      out.unseen_m += weight;
+      continue;
+    }
+    const Match match = in_built.nearest(of_truth[i], p.tangent);
+    all.truth(weight, match);
+    if (Tally* tally = of_kind(p.kind)) tally->truth(weight, match);
+  }
+  out.all = all.finish();
+  out.crease = crease.finish();
+  out.boundary = boundary.finish();
+  return out;
+}
+
+}  // namespace evpose

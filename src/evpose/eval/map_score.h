@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "evpose/map/contour_map.h"
+
+namespace evpose {
+struct PointCloud;
+
+struct MapScoreConfig {
+  double long_m = 0.3;          ///< true edges shorter than this do not count for recall
+  double reach_m = 0.03;        ///< contours further apart are different ones
+  double direction_rad = 0.26;  ///< so are those that differ more in direction
+  double seen_radius_m = 0.05;  ///< a true point was seen if the cloud has ...
+  int seen_points = 6;          ///< ... so many points within the radius
+};
+
+/// Shares and distances are weighted by length.
+struct KindScore {
+  double built_m = 0, true_m = 0;                ///< lengths; true: long and seen
+  double precision_5mm = 0, precision_10mm = 0;  ///< of what was built, the share so near to a true contour
+  double recall_5mm = 0, recall_10mm = 0;        ///< of what is true, the share so near to a built contour
+  double p50_mm = 0, mean_mm = 0, p95_mm = 0;    ///< across, of what was built within reach of a true contour
+  double direction_mean_deg = 0, direction_p95_deg = 0;
+  double sigma_ratio = 0;  ///< rms of distance / stated sigma, of what is within reach; 1 is honest
+};
+
+struct MapScore {
+  KindScore all, crease, boundary;
+  double unseen_m = 0, short_m = 0;  ///< true contours that do not count for recall
+};
+
+/// Compares contours point by point. The distance from a true contour is that across it. `cloud`: what the
+/// map was built from, to tell which true edges it saw; nullptr: all. Both maps must have tangents and
+/// lengths.
+MapScore score_map(const ContourMap& built, const ContourMap& truth, const PointCloud* cloud,
+                   const MapScoreConfig& config);
+
+}  // namespace evpose

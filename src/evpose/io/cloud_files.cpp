@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/cloud_files.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "evpose/core/log.h"
+#include "evpose/io/input_file.h"
+#include "evpose/io/las.h"
+#include "evpose/io/pcd.h"
+#include "evpose/io/ply.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kFarthest_m = 1e7;  // from the origin
+constexpr double kSmallest_m = 0.3;  // scenes that someone flies in are larger ...
+constexpr double kLargest_m = 5000;  // ... and smaller
+
+Expected<PointTable> read_table(const std::string& path) {
+  const auto file = open_to_read(path);
+  if (!file) return file.error();
+  if (file->size == 0) return Error{path, "the file is empty", "copy it again"};
+  std::array<char, 8> head{};
+  const std::size_t size = std::fread(head.data(), 1, head.size(), file->stream.get());
+  const std::string_view start(head.data(), size);
+  if (start.starts_with("ply") || path.ends_with(".ply")) return read_ply_vertices(path);
+  if (start.starts_with("LASF")) return read_las(path);
+  if (start.starts_with("# .PCD") || start.starts_with("VERSION") || path.ends_with(".pcd"))
+    return read_pcd(path);
+  return Error{path, "is neither PLY, PCD nor LAS", "convert the cloud to one of them"};
+}
+
+/// Grey of each row, empty if there is neither intensity nor colour.
+std::vector<double> grey(const PointTable& table) {
+  if (const auto* intensity = table.find("intensity")) return *intensity;
+  const auto *red = table.find("red"), *green = table.find("green"), *blue = table.find("blue");
+  if (red == nullptr || green == nullptr || blue == nullptr) return {};
+  std::vector<double> out(table.rows());
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = 0.299 * (*red)[i] + 0.587 * (*green)[i] + 0.114 * (*blue)[i];
+  return out;
+}
+
+/// Scaled so that the 98th percentile becomes 250.
+std::vector<std::uint8_t> to_bytes(const std::vector<double>& values) {
+  std::vector<double> sorted = values;
+  const auto high =
+      sorted.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), high, sorted.end());
+  const double scale = *high > 0 ? 250 / *high : 0;
+  std::vector<std::uint8_t> out(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    out[i] = static_cast<std::uint8_t>(std::clamp(values[i] * scale, 0.0, 255.0));
+  return out;
+}
+
+}  // namespace
+
+Expected<PointCloud> read_cloud(const std::string& path) {
+  auto table = read_table(path);
+  if (!table) return table.error();
+  const auto *x = table->find("x"), *y = table->find("y"), *z = table->find("z");
+  if (x == nullptr || y == nullptr || z == nullptr)
+    return Error{path, "no columns x, y and z", "is it a point cloud?"};
+  std::vector<std::size_t> kept;
+  kept.reserve(table->rows());
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
+  for (std::size_t i = 0; i < table->rows(); ++i) {
+    const Eigen::Vector3d p((*x)[i], (*y)[i], (*z)[i]);
+    if (!p.allFinite()) continue;
+    if (p.cwiseAbs().maxCoeff() > kFarthest_m)
+      return Error{path, text("point ", i, " (from 0) lies more than ", kFarthest_m, " m from the origin"),
+                   "give metres in a local frame"};
+    low = low.cwiseMin(p), high = high.cwiseMax(p);
+    kept.push_back(i);
+  }
+  if (kept.empty())
+    return Error{path, table->rows() == 0 ? "the cloud is empty: no points" : "no point is finite",
+                 "export it again"};
+  if (kept.size() < table->rows())
+    log_warning(text(path, ": ", table->rows() - kept.size(), " of ", table->rows(),
+                     " points are not finite and are left out"));
+  const double extent = (high - low).maxCoeff();
+  if (extent > kLargest_m)
+    log_warning(
+        text(path, ": ", extent, " m across: are these centimetres or millimetres? Metres are expected"));
+  if (extent < kSmallest_m)
+    log_warning(text(path, ": only ", extent, " m across: are these kilometres? Metres are expected"));
+  PointCloud cloud;
+  cloud.source = path;
+  cloud.anchor = (0.5 * (low + high)).array().round();
+  cloud.points.reserve(kept.size());
+  for (const std::size_t i : kept)
+    cloud.points.push_back((Eigen::Vector3d((*x)[i], (*y)[i], (*z)[i]) - cloud.anchor).cast<float>());
+  if (const auto values = grey(*table); !values.empty()) {
+    std::vector<double> of_kept(kept.size());
+    for (std::size_t k = 0; k < kept.size(); ++k)
+      of_kept[k] = std::isfinite(values[kept[k]]) ? values[kept[k]] : 0;
+    cloud.brightness = to_bytes(of_kept);
+  }
+  return cloud;
+}
+
+}  // namespace evpose

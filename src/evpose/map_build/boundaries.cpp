@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_build/boundaries.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace evpose::map_build {
+namespace {
+
+double density_of(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
+double share_above(double x) { return 0.5 * std::erfc(x / std::numbers::sqrt2); }
+
+struct Step {
+  double place, slope, blur, inside, outside;  // densities per square metre
+  double at(double t, double d) const {
+    return inside * share_above((d - place - slope * t) / blur) + outside;
+  }
+};
+
+/// Log likelihood but for constants; the integral of the density over the strip in closed form for a small
+/// slope, whose first order cancels.
+double log_likelihood(std::span<const Eigen::Vector2d> points, const Step& step, double half_length,
+                      double half_width) {
+  double sum = 0;
+  for (const auto& p : points) sum += std::log(step.at(p.x(), p.y()));
+  return sum - 2 * half_length * (step.inside * (step.place + half_width) + step.outside * 2 * half_width);
+}
+
+}  // namespace
+
+StepFit fit_step(std::span<const Eigen::Vector2d> points, double half_length, double half_width,
+                 double blur_m) {
+  StepFit out;
+  out.blur_m = blur_m;
+  if (points.size() < 10) return out;
+  // First guess: densities of the inner and the outer quarter, the place from the count between.
+  double inner = 0, outer = 0;
+  for (const auto& p : points) {
+    inner += p.y() < -half_width / 2 ? 1 : 0;
+    outer += p.y() > half_width / 2 ? 1 : 0;
+  }
+  const double quarter = 2 * half_length * half_width / 2;
+  const double all = static_cast<double>(points.size());
+  if (inner < 5) return out;
+  Step step{0, 0, blur_m, inner / quarter, (outer + 0.1) / quarter};
+  step.inside = std::max(step.inside - step.outside, 0.1 * step.inside);
+  const auto balanced = [&] {
+    return (all / (2 * half_length) - step.outside * 2 * half_width) / step.inside - half_width;
+  };
+  step.place = std::clamp(balanced(), -0.9 * half_width, 0.9 * half_width);
+  Eigen::Matrix2d information = Eigen::Matrix2d::Identity();
+  for (int round = 0; round < 20; ++round) {
+    // Fisher scoring in place and slope; the inner density from the count, which is its own maximum.
+    Eigen::Vector2d gradient(-2 * half_length * step.inside, 0);
+    information.setZero();
+    double beyond = 0;
+    for (const auto& p : points) {
+      const double x = (p.y() - step.place - step.slope * p.x()) / step.blur;
+      const double density = step.at(p.x(), p.y());
+      const double slope = step.inside * density_of(x) / step.blur / density;
+      const Eigen::Vector2d j(slope, slope * p.x());
+      gradient += j;
+      information += j * j.transpose();
+      beyond += step.outside / density;
+    }
+    // Without a point in the bend the data say nothing of the place beyond one spacing.
+    information(0, 0) += 1e-6;
+    information(1, 1) += 1e-6;
+    Eigen::Vector2d move = information.ldlt().solve(gradient);
+    const double longest = std::max(std::abs(move.x()), std::abs(move.y()) * half_length);
+    if (!(longest < 1e3)) return out;
+    if (longest > step.blur) move *= step.blur / longest;
+    step.place += move.x();
+    step.slope += move.y();
+    step.outside = std::max(beyond, 0.1) / (4 * half_length * half_width);
+    step.inside =
+        std::max((all - beyond) / (2 * half_length * std::max(step.place + half_width, 0.1 * half_width)),
+                 1e-3 * inner / quarter);
+    if (!(std::abs(step.place) < half_width) || !(std::abs(step.slope) < 0.5)) return out;
+    if (longest < 1e-3 * step.blur) {
+      out.converged = true;
+      break;
+    }
+  }
+  out.place = step.place;
+  out.slope = step.slope;
+  const Eigen::Matrix2d covariance = information.inverse();
+  out.sigma_place = std::sqrt(covariance(0, 0));
+  out.sigma_slope = std::sqrt(covariance(1, 1));
+  out.rest = step.outside / step.inside;
+  return out;
+}
+
+namespace {
+
+class BoundaryFinder {
+ public:
+  BoundaryFinder(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane,
+                 const Outline& outline, const std::vector<Piece>& creases, const BoundaryConfig& config)
+      : surface_(surface),
+        tree_(tree),
+        plane_(plane),
+        frame_(plane),
+        outline_(outline),
+        creases_(creases),
+        config_(config) {
+    for (const std::uint32_t i : plane.points)
+      flat_.push_back(frame_.flat(surface.position[i].cast<double>()));
+  }
+
+  Boundaries find(std::int32_t number) const;
+
+ private:
+  bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
+  bool goes_on(const Piece& piece) const;
+  bool fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const;
+
+  const SurfacePoints& surface_;
+  const Neighbours& tree_;
+  const FittedPlane& plane_;
+  PlaneFrame frame_;
+  const Outline& outline_;
+  const std::vector<Piece>& creases_;
+  const BoundaryConfig& config_;
+  std::vector<Eigen::Vector2d> flat_;
+};
+
+/// Half or more of the side lies along a crease.
+bool BoundaryFinder::explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const {
+  const double reach = 1.5 * outline_.cell_m + 2 * surface_.scale.noise_m;
+  constexpr int kProbes = 8;
+  int near = 0;
+  for (int k = 0; k < kProbes; ++k) {
+    const Eigen::Vector3d x = frame_.lift(a + (b - a) * ((k + 0.5) / kProbes));
+    near += std::any_of(creases_.begin(), creases_.end(),
+                        [&](const Piece& piece) { return distance(piece, x) < reach; })
+                ? 1
+                : 0;
+  }
+  return near >= kProbes / 2;
+}
+
+/// Points in the plane beyond the edge: it is none, only a change of density or of the plane's number.
+bool BoundaryFinder::goes_on(const Piece& piece) const {
+  constexpr int kProbes = 12;
+  int hit = 0;
+  std::uint32_t index = 0;
+  float square = 0;
+  const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
+  for (int k = 0; k < kProbes; ++k) {
+    const Eigen::Vector3d x =
+        piece.begin + (piece.end - piece.begin) * ((k + 0.5) / kProbes) + 1.6 * reach * piece.normal_a;
+    if (tree_.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
+        std::sqrt(static_cast<double>(square)) < reach)
+      ++hit;
+  }
+  return hit > kProbes / 2;
+}
+
+bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const {
+  Eigen::Vector2d along = (b - a).normalized(), out(along.y(), -along.x());  // the surface is on the left
+  Eigen::Vector2d middle = 0.5 * (a + b);
+  const double half_length = 0.5 * (b - a).norm();
+  const double half_width = 2.5 * outline_.cell_m;
+  StepFit best;
+  for (int round = 0; round < 2; ++round) {
+    std::vector<Eigen::Vector2d> strip;
+    for (const auto& p : flat_) {
+      const Eigen::Vector2d local(along.dot(p - middle), out.dot(p - middle));
+      if (std::abs(local.x()) <= half_length && std::abs(local.y()) <= half_width) strip.push_back(local);
+    }
+    // The softness of the edge: that which makes the points likeliest.
+    double likeliest = -INFINITY;
+    best = StepFit();
+    for (const double factor : {0.25, 0.5, 1.0, 2.0, 4.0}) {
+      const double blur = factor * std::max(surface_.scale.noise_m, 0.3 * plane_.spacing_m);
+      const StepFit step = fit_step(strip, half_length, half_width, blur);
+      if (!step.converged) continue;
+      double inside = 0;
+      for (const auto& p : strip) inside += p.y() < step.place ? 1 : 0;
+      const double density = inside / (2 * half_length * (step.place + half_width));
+      const double likelihood =
+          log_likelihood(strip, {step.place, step.slope, blur, density, std::max(step.rest, 1e-4) * density},
+                         half_length, half_width);
+      if (likelihood > likeliest) likeliest = likelihood, best = step;
+    }
+    if (!best.converged) return false;
+    middle += best.place * out;
+    along = (along + best.slope * out).normalized();
+    out = {along.y(), -along.x()};
+  }
+  const double soft = config_.most_blur_noise * std::max(surface_.scale.noise_m, 0.3 * plane_.spacing_m);
+  if (best.blur_m > soft || best.rest > 0.25) return false;
+  piece.kind = ContourKind::boundary;
+  piece.begin = frame_.lift(middle - half_length * along);
+  piece.end = frame_.lift(middle + half_length * along);
+  piece.normal_a = out.x() * frame_.first + out.y() * frame_.second;
+  const double across = std::hypot(best.sigma_place, 0.5 * half_length * best.sigma_slope);
+  piece.sigma_m = std::hypot(across, plane_.sigma_at(0.5 * (piece.begin + piece.end)));
+  return across <= config_.most_sigma_m;
+}
+
+Boundaries BoundaryFinder::find(std::int32_t number) const {
+  Boundaries out;
+  for (const Ring& ring : outline_.rings) {
+    std::vector<Piece> pieces;
+    for (std::size_t k = 0; k < ring.corners.size(); ++k) {
+      const Eigen::Vector2d &a = ring.corners[k], &b = ring.corners[(k + 1) % ring.corners.size()];
+      const double length = (b - a).norm();
+      if (explained(a, b)) continue;
+      Piece piece;
+      piece.plane_a = number;
+      if (length < std::max(config_.least_length_m, 3 * outline_.cell_m) || !fit(a, b, piece) ||
+          goes_on(piece)) {
+        out.shadow_m += length;
+        continue;
+      }
+      out.pieces.push_back(piece);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Boundaries find_boundaries(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane,
+                           std::int32_t number, const Outline& outline, const std::vector<Piece>& creases,
+                           const BoundaryConfig& config) {
+  return BoundaryFinder(surface, tree, plane, outline, creases, config).find(number);
+}
+
+}  // namespace evpose::map_build

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "evpose/map_build/piece.h"
+#include "evpose/map_build/planes.h"
+
+namespace evpose {
+class ThreadPool;
+}
+
+namespace evpose::map_build {
+
+struct CreaseConfig {
+  double least_angle_rad = 0.35;  ///< between two planes that make a crease
+  double least_length_m = 0.08;   ///< of a piece
+};
+
+/// Where two planes meet: pieces of the line in which they intersect, as far as both have points up to it.
+/// Ends near a third plane that touches one of the two go to the point where the three meet. `curved` tells
+/// for each plane whether it is a facet of a bent surface: facets beside each other make no crease.
+std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& planes,
+                                const std::vector<bool>& curved, const CreaseConfig& config,
+                                ThreadPool& pool);
+
+/// For each plane whether its points bend like a cylinder, by more than the noise and over an angle that
+/// matters: a facet of a column, pipe or vault.
+std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes);
+
+}  // namespace evpose::map_build

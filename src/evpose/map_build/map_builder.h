@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "evpose/core/error.h"
+#include "evpose/map/contour_map.h"
+#include "evpose/map/point_cloud.h"
+#include "evpose/map_build/boundaries.h"
+#include "evpose/map_build/creases.h"
+#include "evpose/map_build/planes.h"
+#include "evpose/map_build/surface_points.h"
+
+namespace evpose {
+class ConfigTable;
+class ThreadPool;
+}  // namespace evpose
+
+namespace evpose::map_build {
+
+struct BuildConfig {
+  PatchConfig patch;
+  PlaneConfig plane;
+  CreaseConfig crease;
+  BoundaryConfig boundary;
+  double point_spacing_m = 0.02;  ///< of the contours' points in the map
+};
+void describe(ConfigTable& table, BuildConfig& config);
+
+/// What a build found, for people.
+struct BuildFigures {
+  std::size_t points = 0, duplicates = 0, in_planes = 0, planes = 0, curved = 0;
+  CloudScale scale;
+  double crease_m = 0, boundary_m = 0, shadow_m = 0;  ///< lengths; shadows are left out of the map
+};
+
+struct BuiltMap {
+  ContourMap map;
+  BuildFigures figures;
+};
+
+/// From points to planes to contours (EV-Pose, Map Construction; design 5.10). The same for any number of
+/// threads. `progress` is told the share done, 0..1; the work is given up with an error when it returns
+/// false. Errors: too few points, on lines or spots, or so sparse that nothing is flat; no plane or no
+/// contour is found.
+Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, ThreadPool& pool,
+                             const std::function<bool(double)>& progress);
+
+}  // namespace evpose::map_build

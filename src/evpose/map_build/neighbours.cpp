@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_build/neighbours.h"
+
+#include <nanoflann.hpp>
+
+namespace evpose::map_build {
+
+struct Neighbours::Tree {
+  struct Adaptor {
+    const std::vector<Eigen::Vector3f>& points;
+    std::size_t kdtree_get_point_count() const { return points.size(); }
+    float kdtree_get_pt(std::size_t i, std::size_t k) const {
+      return points[i][static_cast<Eigen::Index>(k)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
+  using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Adaptor>, Adaptor, 3,
+                                                    std::uint32_t>;
+  explicit Tree(const std::vector<Eigen::Vector3f>& points)
+      : adaptor{points}, index(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(16)) {
+    index.buildIndex();
+  }
+  Adaptor adaptor;
+  Index index;
+};
+
+Neighbours::Neighbours(const std::vector<Eigen::Vector3f>& points) : tree_(std::make_unique<Tree>(points)) {}
+Neighbours::~Neighbours() = default;
+
+std::size_t Neighbours::nearest(const Eigen::Vector3f& p, std::span<std::uint32_t> indices,
+                                std::span<float> squares) const {
+  return tree_->index.knnSearch(p.data(), indices.size(), indices.data(), squares.data());
+}
+
+}  // namespace evpose::map_build

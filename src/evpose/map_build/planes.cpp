@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_build/planes.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace evpose::map_build {
+namespace {
+
+/// Sums of a region's points.
+struct Moments {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  double count = 0;
+
+  void add(const Eigen::Vector3d& x) {
+    sum += x;
+    squares += x * x.transpose();
+    count += 1;
+  }
+  void add(const Moments& other) {
+    sum += other.sum;
+    squares += other.squares;
+    count += other.count;
+  }
+};
+
+struct Fit {
+  Eigen::Vector3d centre, normal;
+  Eigen::Vector3d values;  ///< variances along `axes`, ascending
+  Eigen::Matrix3d axes;
+  double distance(const Eigen::Vector3d& x) const { return normal.dot(x - centre); }
+};
+
+Fit fit(const Moments& m) {
+  Fit out;
+  out.centre = m.sum / m.count;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.compute(m.squares / m.count - out.centre * out.centre.transpose());
+  out.values = solver.eigenvalues().cwiseMax(0);
+  out.axes = solver.eigenvectors();
+  out.normal = out.axes.col(0);
+  return out;
+}
+
+class Growing {
+ public:
+  Growing(const SurfacePoints& surface, const PlaneConfig& config)
+      : surface_(surface),
+        config_(config),
+        gate_m_(config.gate_sigma * surface.scale.noise_m),
+        cos_(static_cast<float>(std::cos(config.angle_rad))),
+        label_(surface.size(), -1) {}
+
+  void grow_all();
+  void merge_flush();
+  void adopt_bends();
+  Planes result();
+
+ private:
+  Eigen::Vector3d at(std::uint32_t i) const { return surface_.position[i].cast<double>(); }
+  const std::uint32_t* links(std::uint32_t i) const {
+    return &surface_.links[static_cast<std::size_t>(i) * SurfacePoints::kLinks];
+  }
+  void grow(std::uint32_t seed);
+
+  const SurfacePoints& surface_;
+  const PlaneConfig& config_;
+  double gate_m_;
+  float cos_;
+  std::vector<std::int32_t> label_;  ///< -2: tried and left as a seed
+  std::vector<Moments> moments_;
+  std::vector<std::uint32_t> region_;
+};
+
+void Growing::grow_all() {
+  std::vector<std::uint32_t> order(surface_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  // The flattest half is enough to start from: every plane has points of it.
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return surface_.curvature[a] < surface_.curvature[b];
+  });
+  for (const std::uint32_t seed : order)
+    if (label_[seed] == -1 && surface_.normal[seed].squaredNorm() > 0) grow(seed);
+  for (auto& label : label_) label = std::max(label, -1);
+}
+
+void Growing::grow(std::uint32_t seed) {
+  const auto number = static_cast<std::int32_t>(moments_.size());
+  // The first patch: the seed's plane through its neighbours' middle.
+  Moments moments;
+  moments.add(at(seed));
+  for (int k = 0; k < SurfacePoints::kLinks; ++k) moments.add(at(links(seed)[k]));
+  Fit plane;
+  plane.centre = moments.sum / moments.count;
+  plane.normal = surface_.normal[seed].cast<double>();
+  moments = Moments();
+  region_.assign(1, seed);
+  label_[seed] = number;
+  moments.add(at(seed));
+  double refit_at = config_.least_points / 2;
+  for (std::size_t next = 0; next < region_.size(); ++next) {
+    const std::uint32_t* near = links(region_[next]);
+    for (int k = 0; k < SurfacePoints::kLinks; ++k) {
+      const std::uint32_t q = near[k];
+      if (label_[q] >= 0) continue;
+      const Eigen::Vector3f& normal = surface_.normal[q];
+      if (std::abs(normal.dot(plane.normal.cast<float>())) < cos_) continue;
+      if (std::abs(plane.distance(at(q))) > gate_m_) continue;
+      label_[q] = number;
+      region_.push_back(q);
+      moments.add(at(q));
+    }
+    if (moments.count >= refit_at) {
+      plane = fit(moments);
+      refit_at = 1.5 * moments.count;
+    }
+  }
+  bool keep = moments.count >= config_.least_points;
+  if (keep) {
+    plane = fit(moments);
+    // Flat means: wider than thick both ways.
+    keep = plane.values[1] > 6 * plane.values[0];
+  }
+  if (!keep) {
+    for (const std::uint32_t i : region_) label_[i] = -1;
+    label_[seed] = -2;
+    return;
+  }
+  // Points that the region's first, rougher planes let in.
+  Moments kept;
+  for (const std::uint32_t i : region_) {
+    if (std::abs(plane.distance(at(i))) <= gate_m_)
+      kept.add(at(i));
+    else
+      label_[i] = -1;
+  }
+  moments_.push_back(kept);
+}
+
+void Growing::merge_flush() {
+  // Largest first; a union of regions is fitted anew before the next is judged.
+  const std::size_t count = moments_.size();
+  std::vector<std::int32_t> parent(count);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](std::int32_t a) {
+    while (parent[static_cast<std::size_t>(a)] != a) a = parent[static_cast<std::size_t>(a)];
+    return a;
+  };
+  std::map<std::pair<std::int32_t, std::int32_t>, int> touching;
+  for (std::uint32_t i = 0; i < label_.size(); ++i) {
+    if (label_[i] < 0) continue;
+    for (int k = 0; k < SurfacePoints::kLinks; ++k) {
+      const std::int32_t other = label_[links(i)[k]];
+      if (other > label_[i]) ++touching[{label_[i], other}];
+    }
+  }
+  std::vector<std::pair<std::pair<std::int32_t, std::int32_t>, int>> pairs(touching.begin(), touching.end());
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  for (const auto& [pair, links_between] : pairs) {
+    const std::int32_t a = root(pair.first), b = root(pair.second);
+    if (a == b) continue;
+    Moments& ma = moments_[static_cast<std::size_t>(a)];
+    const Moments& mb = moments_[static_cast<std::size_t>(b)];
+    const Fit fa = fit(ma), fb = fit(mb);
+    Moments both = ma;
+    both.add(mb);
+    const Fit fab = fit(both);
+    // Each part must lie in the joint plane as well as in its own, but for a fraction of the noise.
+    const double slack = 0.25 * surface_.scale.noise_m * surface_.scale.noise_m;
+    const auto thickness = [&](const Moments& m) {
+      const Eigen::Vector3d mean = m.sum / m.count;
+      const Eigen::Matrix3d about = m.squares / m.count - mean * mean.transpose();
+      const double off = fab.distance(mean);
+      return fab.normal.dot(about * fab.normal) + off * off;
+    };
+    const double angle_cos = std::abs(fa.normal.dot(fb.normal));
+    const bool small = std::min(ma.count, mb.count) < 4 * config_.least_points;
+    if (angle_cos < std::cos(small ? 4 * config_.merge_rad : config_.merge_rad)) continue;
+    if (thickness(ma) > fa.values[0] + slack || thickness(mb) > fb.values[0] + slack) continue;
+    ma = both;
+    parent[static_cast<std::size_t>(b)] = a;
+  }
+  std::vector<std::int32_t> renumbered(count, -1);
+  std::vector<Moments> kept;
+  for (std::size_t i = 0; i < count; ++i)
+    if (parent[i] == static_cast<std::int32_t>(i)) {
+      renumbered[i] = static_cast<std::int32_t>(kept.size());
+      kept.push_back(moments_[i]);
+    }
+  for (auto& label : label_)
+    if (label >= 0) label = renumbered[static_cast<std::size_t>(root(label))];
+  moments_ = std::move(kept);
+}
+
+Planes Growing::result() {
+  Planes out;
+  out.label = label_;
+  out.planes.resize(moments_.size());
+  for (std::uint32_t i = 0; i < label_.size(); ++i)
+    if (label_[i] >= 0) out.planes[static_cast<std::size_t>(label_[i])].points.push_back(i);
+  for (std::size_t p = 0; p < out.planes.size(); ++p) {
+    FittedPlane& plane = out.planes[p];
+    const Fit f = fit(moments_[p]);
+    plane.normal = f.normal;
+    plane.centre = f.centre;
+    plane.d = -f.normal.dot(f.centre);
+    plane.rms_m = std::sqrt(f.values[0]);
+    const double n = moments_[p].count;
+    // Neighbours share registration and calibration errors: a plane is never known better than a part of the
+    // noise that many points cannot average away.
+    const double floor = std::pow(0.03 * surface_.scale.noise_m, 2);
+    plane.offset_variance = f.values[0] / n + floor;
+    for (int k = 1; k < 3; ++k)
+      plane.tilt_covariance += f.axes.col(k) * f.axes.col(k).transpose() * (f.values[0] / (n * f.values[k]));
+    std::vector<float> spacing;
+    const std::size_t step = std::max<std::size_t>(1, plane.points.size() / 1000);
+    for (std::size_t i = 0; i < plane.points.size(); i += step)
+      spacing.push_back(surface_.spacing_m[plane.points[i]]);
+    if (!spacing.empty()) {
+      std::nth_element(spacing.begin(), spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2),
+                       spacing.end());
+      plane.spacing_m = static_cast<double>(spacing[spacing.size() / 2]);
+    }
+  }
+  return out;
+}
+
+void Growing::adopt_bends() {
+  std::vector<Fit> planes;
+  for (const Moments& m : moments_) planes.push_back(fit(m));
+  std::vector<std::pair<std::uint32_t, std::int32_t>> adopted;
+  // As many rounds as a patch is wide in points.
+  const int rounds = 2 + static_cast<int>(std::sqrt(surface_.scale.neighbours));
+  for (int round = 0; round < rounds; ++round) {
+    adopted.clear();
+    for (std::uint32_t i = 0; i < label_.size(); ++i) {
+      if (label_[i] >= 0) continue;
+      double nearest = gate_m_;
+      std::int32_t best = -1;
+      for (int k = 0; k < SurfacePoints::kLinks; ++k) {
+        const std::int32_t other = label_[links(i)[k]];
+        if (other < 0) continue;
+        const double distance = std::abs(planes[static_cast<std::size_t>(other)].distance(at(i)));
+        if (distance < nearest || (distance == nearest && best >= 0 && other < best))
+          nearest = distance, best = other;
+      }
+      if (best >= 0) adopted.emplace_back(i, best);
+    }
+    if (adopted.empty()) break;
+    for (const auto& [i, label] : adopted) label_[i] = label;
+  }
+}
+
+}  // namespace
+
+double FittedPlane::sigma_at(const Eigen::Vector3d& x) const {
+  const Eigen::Vector3d lever = x - centre;
+  return std::sqrt(offset_variance + lever.dot(tilt_covariance * lever));
+}
+
+Planes find_planes(const SurfacePoints& surface, const PlaneConfig& config) {
+  Growing growing(surface, config);
+  growing.grow_all();
+  growing.merge_flush();
+  growing.adopt_bends();
+  return growing.result();
+}
+
+}  // namespace evpose::map_build

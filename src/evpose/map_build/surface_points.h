@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "evpose/core/error.h"
+
+namespace evpose {
+class ThreadPool;
+struct PointCloud;
+}  // namespace evpose
+
+namespace evpose::map_build {
+
+/// What the cloud is like where it is flat: medians over a sample.
+struct CloudScale {
+  double spacing_m = 0;  ///< a square of this side holds one point of a surface
+  double noise_m = 0;    ///< of a point, across the surface, 1 sigma
+  int neighbours = 0;    ///< that a patch needs for its normal to be known to `normal_sigma_rad`
+};
+
+/// A cloud's points with what their neighbourhoods say.
+struct SurfacePoints {
+  static constexpr int kLinks = 12;
+  std::vector<Eigen::Vector3f> position;
+  std::vector<Eigen::Vector3f> normal;  ///< unit, of either sign; zero where no patch is flat enough
+  std::vector<float> curvature;         ///< l0 / (l0 + l1 + l2) of the patch's covariance
+  std::vector<float> spacing_m;         ///< local: of the patch
+  std::vector<std::uint32_t> links;     ///< the nearest kLinks of each point, nearest first, itself left out
+  CloudScale scale;
+
+  std::size_t size() const { return position.size(); }
+};
+
+/// The smallest patch in which the direction of a flat surface is known to `normal_sigma_rad`, from the patch
+/// itself: noise^2 / (spread^2 count). A fixed number of neighbours on a dense cloud looks at a patch no
+/// larger than the noise, where everything looks curved.
+struct PatchConfig {
+  double normal_sigma_rad = 0.05;
+  int least = 12, most = 160;  ///< points of a patch
+};
+
+/// Spacing and noise from patches around a sample of points, each grown until it is flat. Errors: fewer than
+/// 50 points, or all of them on a line; `where` names the cloud in them.
+Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, const PatchConfig& config,
+                                   const std::string& where);
+
+/// Normals and curvatures by principal components of each point's patch (EV-Pose, Map Construction).
+SurfacePoints describe_surface(std::vector<Eigen::Vector3f> points, const CloudScale& scale,
+                               const PatchConfig& config, ThreadPool& pool);
+
+}  // namespace evpose::map_build

@@ -18,6 +18,7 @@ namespace {
 constexpr double kBinSpacings = 2.5;  // length and depth of a bin of support, in point spacings
 constexpr double kCovered = 0.35;     // least share of a bin that its points stand for
 constexpr double kAmbiguous = 1.5;    // noise: so near to the line a point may be of either plane
+constexpr double kUneven = 0.5;        // noise: so far a surface may leave its plane near the line
 constexpr int kLargestGap = 2;        // bins without support that a piece bridges
 
 using PlanePair = std::pair<std::int32_t, std::int32_t>;
@@ -76,10 +77,11 @@ struct Support {
   }
 };
 
-/// Points of a plane near a line: places along it, distances from it within the plane, spacings.
+/// Points of a plane near a line: places along it, distances from it within the plane, heights over the plane,
+/// spacings.
 struct NearLine {
   std::vector<Eigen::Vector2d> place;
-  std::vector<double> spacing;
+  std::vector<double> height, spacing;
 };
 
 NearLine near_line(const SurfacePoints& surface, const FittedPlane& plane, const Line& line, double reach_m) {
@@ -91,8 +93,64 @@ NearLine near_line(const SurfacePoints& surface, const FittedPlane& plane, const
     const float d = across.dot(x);
     if (std::abs(d) > static_cast<float>(reach_m)) continue;
     out.place.emplace_back(line.direction.dot(x.cast<double>()), static_cast<double>(d));
+    out.height.push_back(plane.distance(surface.position[i].cast<double>()));
     out.spacing.push_back(static_cast<double>(surface.spacing_m[i]));
   }
+  return out;
+}
+
+/// How a surface runs beside a line, relative to its plane: height = offset + slope (t - middle).
+struct Strip {
+  double offset = 0, slope = 0;
+  double sigma = 0;  ///< of the height, with what is left of the chunks' scatter
+};
+
+struct StripRange {
+  double t0, t1, d0, d1;  ///< along and across the line
+  int side;               ///< 1: above it, 0: below
+};
+
+/// Weighted fit to the mean heights of chunks along the line; the plane itself is the prior, as good as `prior_m`.
+/// What the chunks scatter beyond their noise is unevenness of the surface, and enters sigma.
+Strip fit_strip(const NearLine& near, const StripRange& range, double noise_m, double prior_m) {
+  constexpr int kChunkPoints = 12, kMostChunks = 64;
+  std::vector<std::pair<double, double>> inside;
+  for (std::size_t k = 0; k < near.place.size(); ++k) {
+    const double t = near.place[k].x(), d = near.place[k].y() * (range.side == 1 ? 1 : -1);
+    if (t >= range.t0 && t <= range.t1 && d >= range.d0 && d <= range.d1) inside.emplace_back(t, near.height[k]);
+  }
+  Strip out;
+  out.sigma = prior_m;
+  const int chunks = std::clamp(static_cast<int>(inside.size()) / kChunkPoints, 1, kMostChunks);
+  std::vector<double> sum(static_cast<std::size_t>(chunks), 0), count(sum), place(sum);
+  const double length = range.t1 - range.t0, middle = 0.5 * (range.t0 + range.t1);
+  for (const auto& [t, height] : inside) {
+    const auto j = static_cast<std::size_t>(std::clamp(static_cast<int>((t - range.t0) / length * chunks), 0, chunks - 1));
+    sum[j] += height, place[j] += t - middle, count[j] += 1;
+  }
+  // The slope's prior: the same height at the ends.
+  const double prior = 1 / (prior_m * prior_m);
+  Eigen::Matrix2d information = Eigen::Vector2d(prior, prior * length * length / 12).asDiagonal();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  for (std::size_t j = 0; j < sum.size(); ++j) {
+    if (count[j] < 3) continue;
+    const Eigen::Vector2d row(1, place[j] / count[j]);
+    const double weight = count[j] / (noise_m * noise_m);
+    information += weight * row * row.transpose();
+    right += weight * (sum[j] / count[j]) * row;
+  }
+  const Eigen::Vector2d fitted = information.ldlt().solve(right);
+  out.offset = fitted[0];
+  out.slope = fitted[1];
+  double scatter = 0, expected = 0, used = 0;
+  for (std::size_t j = 0; j < sum.size(); ++j) {
+    if (count[j] < 3) continue;
+    scatter += std::pow(sum[j] / count[j] - fitted[0] - fitted[1] * place[j] / count[j], 2);
+    expected += noise_m * noise_m / count[j];
+    used += 1;
+  }
+  const double uneven = used > 2 ? std::max(scatter - expected * (used - 2) / used, 0.0) / (used - 2) : 0;
+  out.sigma = std::sqrt(1 / information(0, 0) + uneven);
   return out;
 }
 
@@ -118,6 +176,12 @@ class CreaseFinder {
  private:
   double snapped(const Line& line, double t, double reach_m, const PlanePair& pair,
                  const std::vector<std::int32_t>& thirds) const;
+
+  Strip strip_of(const NearLine& near, double t0, double t1, bool above, double gap_m, double bin_m,
+                 const FittedPlane& plane) const {
+    const double prior = std::hypot(plane.sigma_at(plane.centre), kUneven * surface_.scale.noise_m);
+    return fit_strip(near, {t0, t1, gap_m, gap_m + 1.5 * bin_m, above ? 1 : 0}, plane.rms_m, prior);
+  }
 
   const SurfacePoints& surface_;
   const Planes& planes_;
@@ -175,17 +239,28 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
     t0 = snapped(line, t0, reach_m, pair, thirds);
     t1 = snapped(line, t1, reach_m, pair, thirds);
     if (t1 - t0 < config_.least_length_m) continue;
+    const Strip strip_a = strip_of(near_a, t0, t1, sides_a > 0, gap_m, bin_m, a);
+    const Strip strip_b = strip_of(near_b, t0, t1, sides_b > 0, gap_m, bin_m, b);
     Piece piece;
     piece.kind = ContourKind::crease;
     piece.plane_a = pair.first;
     piece.plane_b = pair.second;
-    piece.begin = line.origin + t0 * line.direction;
-    piece.end = line.origin + t1 * line.direction;
+    // Both surfaces moved to where they are beside the line: n_a . x = height a, n_b . x = height b.
+    Eigen::Matrix3d rows;
+    rows << a.normal.transpose(), b.normal.transpose(), line.direction.transpose();
+    const Eigen::Matrix3d solve = rows.inverse();
+    const auto moved = [&](double t, double from_middle) -> Eigen::Vector3d {
+      return line.origin + t * line.direction +
+             solve * Eigen::Vector3d(strip_a.offset + strip_a.slope * from_middle,
+                                     strip_b.offset + strip_b.slope * from_middle, 0);
+    };
+    piece.begin = moved(t0, 0.5 * (t0 - t1));
+    piece.end = moved(t1, 0.5 * (t1 - t0));
     // The surface lies on the side of its points: out of it points the other.
     piece.normal_a = line.direction.cross(a.normal) * (sides_a > 0 ? -1 : 1);
     piece.normal_b = line.direction.cross(b.normal) * (sides_b > 0 ? -1 : 1);
-    const Eigen::Vector3d middle = 0.5 * (piece.begin + piece.end);
-    piece.sigma_m = std::hypot(a.sigma_at(middle), b.sigma_at(middle)) / sine;
+    piece.sigma_m = std::hypot(strip_a.sigma, strip_b.sigma) / (std::sqrt(2.0) * sine);
+    if (piece.sigma_m > config_.most_sigma_m) continue;
     out.push_back(piece);
   }
   return out;
@@ -259,7 +334,7 @@ std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes
     // The curvature's own error: that of a parabola over a strip, 12 sqrt(5) noise / (sqrt(n) w^2).
     const double sigma_turn =
         12 * std::sqrt(5.0) * plane.rms_m / (std::sqrt(static_cast<double>(plane.points.size())) * width);
-    out[p] = turn > 0.25 && turn > 5 * sigma_turn;
+    out[p] = turn > 0.2 && turn > 4 * sigma_turn;
   }
   return out;
 }

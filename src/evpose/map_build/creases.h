@@ -15,9 +15,12 @@ namespace evpose::map_build {
 struct CreaseConfig {
   double least_angle_rad = 0.35;  ///< between two planes that make a crease
   double least_length_m = 0.08;   ///< of a piece
+  double most_sigma_m = 0.006;    ///< of a piece's place
 };
 
-/// Where two planes meet: pieces of the line in which they intersect, as far as both have points up to it.
+/// Where two planes meet: pieces of the line in which they intersect, as far as both have points up to it. Near
+/// the line each plane is fitted again to the points beside it: walls carry skirtings, floors sag, scans are
+/// registered to a centimetre.
 /// Ends near a third plane that touches one of the two go to the point where the three meet. `curved` tells
 /// for each plane whether it is a facet of a bent surface: facets beside each other make no crease.
 std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& planes,

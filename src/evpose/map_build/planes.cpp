@@ -10,6 +10,8 @@
 namespace evpose::map_build {
 namespace {
 
+constexpr double kBendNoise = 1.2;  // rms distance from the planes beside it, in units of the noise
+
 /// Sums of a region's points.
 struct Moments {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -56,6 +58,7 @@ class Growing {
         label_(surface.size(), -1) {}
 
   void grow_all();
+  void dissolve_bends();
   void merge_flush();
   void adopt_bends();
   Planes result();
@@ -139,6 +142,53 @@ void Growing::grow(std::uint32_t seed) {
       label_[i] = -1;
   }
   moments_.push_back(kept);
+}
+
+/// A bend between two planes looks flat to patches that reach into both. What lies in the planes beside it, but
+/// for the noise, is no plane of its own.
+void Growing::dissolve_bends() {
+  const std::size_t count = moments_.size();
+  std::vector<std::vector<std::uint32_t>> members(count);
+  for (std::uint32_t i = 0; i < label_.size(); ++i)
+    if (label_[i] >= 0) members[static_cast<std::size_t>(label_[i])].push_back(i);
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return members[a].size() < members[b].size(); });
+  std::vector<bool> dissolved(count, false);
+  std::vector<Fit> planes;
+  for (const Moments& m : moments_) planes.push_back(fit(m));
+  for (const std::size_t region : order) {
+    std::map<std::size_t, int> beside;
+    for (const std::uint32_t i : members[region])
+      for (int k = 0; k < SurfacePoints::kLinks; ++k) {
+        const std::int32_t other = label_[links(i)[k]];
+        if (other >= 0 && members[static_cast<std::size_t>(other)].size() > members[region].size())
+          ++beside[static_cast<std::size_t>(other)];
+      }
+    if (beside.empty()) continue;
+    double sum = 0;
+    for (const std::uint32_t i : members[region]) {
+      double least = INFINITY;
+      for (const auto& [other, links_between] : beside)
+        least = std::min(least, std::abs(planes[other].distance(at(i))));
+      sum += least * least;
+    }
+    const double noise = kBendNoise * surface_.scale.noise_m;
+    if (sum > noise * noise * static_cast<double>(members[region].size())) continue;
+    dissolved[region] = true;
+    for (const std::uint32_t i : members[region]) label_[i] = -1;
+  }
+  std::vector<std::int32_t> renumbered(count, -1);
+  std::vector<Moments> kept;
+  for (std::size_t i = 0; i < count; ++i)
+    if (!dissolved[i]) {
+      renumbered[i] = static_cast<std::int32_t>(kept.size());
+      kept.push_back(moments_[i]);
+    }
+  for (auto& label : label_)
+    if (label >= 0) label = renumbered[static_cast<std::size_t>(label)];
+  moments_ = std::move(kept);
 }
 
 void Growing::merge_flush() {
@@ -266,6 +316,7 @@ double FittedPlane::sigma_at(const Eigen::Vector3d& x) const {
 Planes find_planes(const SurfacePoints& surface, const PlaneConfig& config) {
   Growing growing(surface, config);
   growing.grow_all();
+  growing.dissolve_bends();
   growing.merge_flush();
   growing.adopt_bends();
   return growing.result();

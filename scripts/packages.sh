@@ -20,6 +20,7 @@ build=(
   libpng-dev           # pictures in the report and in recordings
   libbz2-dev liblz4-dev libzstd-dev libblosc-dev  # compressed bags, recordings and data sets
   libsqlite3-dev       # ROS 2 bags
+  libnanoflann-dev     # nearest points, to build maps from clouds
   libembree-dev        # ray casting in the simulator
   libassimp-dev        # meshes for the simulator
   libboost-dev         # the viewer's server

@@ -58,6 +58,7 @@ MapFigures figures_of(const ContourMap& map) {
 void add_map(CLI::App& app, std::function<int()>& run) {
   auto* map = app.add_subcommand("map", "Make and look at map files");
   map->require_subcommand(1);
+  add_map_build(*map, run);
   struct Options {
     std::string input, occluders, output = "map.h5";
   };
@@ -66,15 +67,13 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   import->add_option("contours", o->input, "contours.ply, or any cloud of edge points")->required();
   import->add_option("--occluders", o->occluders, "PLY mesh that hides contours behind it");
   import->add_option("-o,--output", o->output, "map file")->capture_default_str();
-  import->callback([o, &run] { run = [o] { return import_map(o->input, o->occluders, o->output);
-};
-}  // namespace evpose
-);
-add_map_build(*map, run);
-add_map_compare(*map, run);
+  const auto run_import = [o] { return import_map(o->input, o->occluders, o->output); };
+  import->callback([&run, run_import] { run = run_import;
+});
 auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
 info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
 info->callback([o, &run] { run = [o] { return print_map(o->input); }; });
-}
+add_map_compare(*map, run);
+}  // namespace evpose
 
 }  // namespace evpose

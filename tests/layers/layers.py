@@ -36,6 +36,7 @@ OUTSIDE = [
     ("libpng", r"png\.h", FORMATS),
     ("compressors", r"(bzlib|lz4|lz4frame|zstd|blosc|zlib)\.h", {"io"}),
     ("SQLite", r"sqlite3\.h", {"io"}),
+    ("nanoflann", r"nanoflann", {"map_build"}),
     ("Embree", r"embree3/", {"sim"}),
     ("assimp", r"assimp/", {"sim"}),
     ("Boost", r"boost/", {"view"}),

@@ -149,7 +149,8 @@ MapScore score_map(const ContourMap& built, const ContourMap& truth, const Point
   if (cloud != nullptr)
     for (const auto& p : cloud->points)
       seen.push_back((cloud->anchor - truth.anchor + p.cast<double>()).cast<float>());
-  const auto radius = static_cast<float>(config.seen_radius_m);
+  // Of a sparse cloud six points of the two surfaces lie further around.
+  const float radius = std::max(static_cast<float>(config.seen_radius_m), 5 * typical_spacing(seen));
   const PointGrid seen_grid(seen, radius);
   const auto lengths = edge_lengths(truth, of_truth);
   MapScore out;

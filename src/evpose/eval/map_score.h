@@ -14,7 +14,7 @@ struct MapScoreConfig {
   double long_m = 0.3;          ///< true edges shorter than this do not count for recall
   double reach_m = 0.03;        ///< contours further apart are different ones
   double direction_rad = 0.26;  ///< so are those that differ more in direction
-  double seen_radius_m = 0.05;  ///< a true point was seen if the cloud has ...
+  double seen_radius_m = 0.05;  ///< a true point was seen if the cloud, unless it is sparse, has ...
   int seen_points = 6;          ///< ... so many points within the radius
 };
 

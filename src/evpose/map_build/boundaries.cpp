@@ -10,6 +10,8 @@
 namespace evpose::map_build {
 namespace {
 
+constexpr double kMovedByBlur = 0.3;
+
 double density_of(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
 double share_above(double x) { return 0.5 * std::erfc(x / std::numbers::sqrt2); }
 
@@ -51,43 +53,55 @@ StepFit fit_step(std::span<const Eigen::Vector2d> points, double half_length, do
     return (all / (2 * half_length) - step.outside * 2 * half_width) / step.inside - half_width;
   };
   step.place = std::clamp(balanced(), -0.9 * half_width, 0.9 * half_width);
-  Eigen::Matrix2d information = Eigen::Matrix2d::Identity();
-  for (int round = 0; round < 20; ++round) {
-    // Fisher scoring in place and slope; the inner density from the count, which is its own maximum.
-    Eigen::Vector2d gradient(-2 * half_length * step.inside, 0);
+  Eigen::Matrix3d information = Eigen::Matrix3d::Identity();
+  constexpr int kMostRounds = 60;
+  constexpr double kNoGain = 1e-3;
+  double likelihood = log_likelihood(points, step, half_length, half_width);
+  for (int round = 0; round < kMostRounds; ++round) {
+    // Fisher scoring in place, slope and inner density (relative); the rest by expectation.
+    Eigen::Vector3d gradient(-2 * half_length * step.inside, 0,
+                             -2 * half_length * (step.place + half_width) * step.inside);
     information.setZero();
     double beyond = 0;
     for (const auto& p : points) {
       const double x = (p.y() - step.place - step.slope * p.x()) / step.blur;
       const double density = step.at(p.x(), p.y());
       const double slope = step.inside * density_of(x) / step.blur / density;
-      const Eigen::Vector2d j(slope, slope * p.x());
+      const Eigen::Vector3d j(slope, slope * p.x(), step.inside * share_above(x) / density);
       gradient += j;
       information += j * j.transpose();
       beyond += step.outside / density;
     }
-    // Without a point in the bend the data say nothing of the place beyond one spacing.
-    information(0, 0) += 1e-6;
-    information(1, 1) += 1e-6;
-    Eigen::Vector2d move = information.ldlt().solve(gradient);
+    information.diagonal() += Eigen::Vector3d(1e-6, 1e-6, 1e-6);
+    const Eigen::Vector3d move = information.ldlt().solve(gradient);
     const double longest = std::max(std::abs(move.x()), std::abs(move.y()) * half_length);
     if (!(longest < 1e3)) return out;
-    if (longest > step.blur) move *= step.blur / longest;
-    step.place += move.x();
-    step.slope += move.y();
-    step.outside = std::max(beyond, 0.1) / (4 * half_length * half_width);
-    step.inside =
-        std::max((all - beyond) / (2 * half_length * std::max(step.place + half_width, 0.1 * half_width)),
-                 1e-3 * inner / quarter);
-    if (!(std::abs(step.place) < half_width) || !(std::abs(step.slope) < 0.5)) return out;
-    if (longest < 1e-3 * step.blur) {
-      out.converged = true;
+    // Only uphill: the step is halved until the points become likelier.
+    Step best = step;
+    double gain = 0;
+    for (double share = std::min(1.0, 2 * step.blur / std::max(longest, 1e-9)); share > 1e-3; share *= 0.5) {
+      Step next = step;
+      next.place += share * move.x();
+      next.slope += share * move.y();
+      next.inside *= std::exp(std::clamp(share * move.z(), -0.5, 0.5));
+      next.outside = std::max(beyond, 0.1) / (4 * half_length * half_width);
+      if (!(std::abs(next.place) < half_width) || !(std::abs(next.slope) < 0.5)) continue;
+      const double now = log_likelihood(points, next, half_length, half_width);
+      gain = now - likelihood;
+      if (gain < 0) continue;
+      best = next;
+      likelihood = now;
+      break;
+    }
+    step = best;
+    if (gain < kNoGain) {
+      out.converged = gain > -kNoGain || longest < 0.1 * step.blur;
       break;
     }
   }
   out.place = step.place;
   out.slope = step.slope;
-  const Eigen::Matrix2d covariance = information.inverse();
+  const Eigen::Matrix3d covariance = information.inverse();
   out.sigma_place = std::sqrt(covariance(0, 0));
   out.sigma_slope = std::sqrt(covariance(1, 1));
   out.rest = step.outside / step.inside;
@@ -95,6 +109,8 @@ StepFit fit_step(std::span<const Eigen::Vector2d> points, double half_length, do
 }
 
 namespace {
+
+double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane);
 
 class BoundaryFinder {
  public:
@@ -109,6 +125,7 @@ class BoundaryFinder {
         config_(config) {
     for (const std::uint32_t i : plane.points)
       flat_.push_back(frame_.flat(surface.position[i].cast<double>()));
+    free_side_ = side_of_the_rest(surface, plane);
   }
 
   Boundaries find(std::int32_t number) const;
@@ -116,6 +133,7 @@ class BoundaryFinder {
  private:
   bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
   bool goes_on(const Piece& piece) const;
+  bool covered(const Piece& piece) const;
   bool fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const;
 
   const SurfacePoints& surface_;
@@ -126,6 +144,7 @@ class BoundaryFinder {
   const std::vector<Piece>& creases_;
   const BoundaryConfig& config_;
   std::vector<Eigen::Vector2d> flat_;
+  double free_side_ = 0;
 };
 
 /// Half or more of the side lies along a crease.
@@ -158,6 +177,47 @@ bool BoundaryFinder::goes_on(const Piece& piece) const {
       ++hit;
   }
   return hit > kProbes / 2;
+}
+
+/// Something stands before the plane beyond the edge, on the side that the plane was seen from: the surface
+/// is not over there, it is merely hidden. Only told of planes that have nearly everything on one side, like
+/// walls.
+bool BoundaryFinder::covered(const Piece& piece) const {
+  if (free_side_ == 0) return false;
+  constexpr int kProbes = 8, kHeights = 6;
+  constexpr double kHighest_m = 0.45;
+  int hit = 0;
+  std::uint32_t index = 0;
+  float square = 0;
+  const double reach = std::max(2 * plane_.spacing_m, 0.04), lowest = 2 * reach;
+  for (int k = 0; k < kProbes; ++k) {
+    const Eigen::Vector3d beyond =
+        piece.begin + (piece.end - piece.begin) * ((k + 0.5) / kProbes) + 1.5 * reach * piece.normal_a;
+    for (int h = 0; h < kHeights; ++h) {
+      const Eigen::Vector3d x =
+          beyond + free_side_ * (lowest + (kHighest_m - lowest) * h / (kHeights - 1)) * plane_.normal;
+      if (tree_.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
+          std::sqrt(static_cast<double>(square)) < reach) {
+        ++hit;
+        break;
+      }
+    }
+  }
+  return hit > kProbes / 2;
+}
+
+/// Side of the plane that nearly all other points of the cloud lie on; 0 if there is none.
+double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) {
+  constexpr double kAway_m = 0.1, kNearlyAll = 0.9;
+  double above = 0, below = 0;
+  const std::size_t step = std::max<std::size_t>(1, surface.size() / 4000);
+  for (std::size_t i = 0; i < surface.size(); i += step) {
+    const double d = plane.distance(surface.position[i].cast<double>());
+    above += d > kAway_m ? 1 : 0;
+    below += d < -kAway_m ? 1 : 0;
+  }
+  if (above > kNearlyAll * (above + below)) return 1;
+  return below > kNearlyAll * (above + below) ? -1 : 0;
 }
 
 bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const {
@@ -199,7 +259,9 @@ bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Pie
   piece.end = frame_.lift(middle + half_length * along);
   piece.normal_a = out.x() * frame_.first + out.y() * frame_.second;
   const double across = std::hypot(best.sigma_place, 0.5 * half_length * best.sigma_slope);
-  piece.sigma_m = std::hypot(across, plane_.sigma_at(0.5 * (piece.begin + piece.end)));
+  // What blurs the edge also moves it, by a part of the blur.
+  piece.sigma_m =
+      std::hypot(across, kMovedByBlur * best.blur_m, plane_.sigma_at(0.5 * (piece.begin + piece.end)));
   return across <= config_.most_sigma_m;
 }
 
@@ -213,8 +275,9 @@ Boundaries BoundaryFinder::find(std::int32_t number) const {
       if (explained(a, b)) continue;
       Piece piece;
       piece.plane_a = number;
-      if (length < std::max(config_.least_length_m, 3 * outline_.cell_m) || !fit(a, b, piece) ||
-          goes_on(piece)) {
+      const bool edge = length >= std::max(config_.least_length_m, 3 * outline_.cell_m) && fit(a, b, piece) &&
+                        !goes_on(piece) && !covered(piece);
+      if (!edge) {
         out.shadow_m += length;
         continue;
       }

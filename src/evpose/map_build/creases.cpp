@@ -2,9 +2,9 @@
 #include "evpose/map_build/creases.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,11 +15,14 @@
 namespace evpose::map_build {
 namespace {
 
-constexpr double kBinSpacings = 2.5;  // length and depth of a bin of support, in point spacings
-constexpr double kCovered = 0.35;     // least share of a bin that its points stand for
-constexpr double kAmbiguous = 1.5;    // noise: so near to the line a point may be of either plane
-constexpr double kUneven = 0.5;        // noise: so far a surface may leave its plane near the line
-constexpr int kLargestGap = 2;        // bins without support that a piece bridges
+constexpr double kBinSpacings = 2.5;    // length and depth of a bin of support, in point spacings
+constexpr double kCovered = 0.35;       // least share of a bin that its points stand for
+constexpr double kAmbiguous = 1.5;      // noise: so near to the line a point may be of either plane
+constexpr double kSpeaksAgainst = 3;    // sigma
+constexpr double kUneven = 0.1;         // noise: so far a surface may leave its plane near the line
+constexpr double kFacetSin = 0.87;      // of the angle between facets of a column, pipe or vault, at most
+constexpr double kFacetWidth_m = 0.25;  // of such facets, at most
+constexpr int kLargestGap = 2;          // bins without support that a piece bridges
 
 using PlanePair = std::pair<std::int32_t, std::int32_t>;
 
@@ -77,8 +80,8 @@ struct Support {
   }
 };
 
-/// Points of a plane near a line: places along it, distances from it within the plane, heights over the plane,
-/// spacings.
+/// Points of a plane near a line: places along it, distances from it within the plane, heights over the
+/// plane, spacings.
 struct NearLine {
   std::vector<Eigen::Vector2d> place;
   std::vector<double> height, spacing;
@@ -110,14 +113,15 @@ struct StripRange {
   int side;               ///< 1: above it, 0: below
 };
 
-/// Weighted fit to the mean heights of chunks along the line; the plane itself is the prior, as good as `prior_m`.
-/// What the chunks scatter beyond their noise is unevenness of the surface, and enters sigma.
+/// Weighted fit to the mean heights of chunks along the line; the plane itself is the prior, as good as
+/// `prior_m`. What the chunks scatter beyond their noise is unevenness of the surface, and enters sigma.
 Strip fit_strip(const NearLine& near, const StripRange& range, double noise_m, double prior_m) {
   constexpr int kChunkPoints = 12, kMostChunks = 64;
   std::vector<std::pair<double, double>> inside;
   for (std::size_t k = 0; k < near.place.size(); ++k) {
     const double t = near.place[k].x(), d = near.place[k].y() * (range.side == 1 ? 1 : -1);
-    if (t >= range.t0 && t <= range.t1 && d >= range.d0 && d <= range.d1) inside.emplace_back(t, near.height[k]);
+    if (t >= range.t0 && t <= range.t1 && d >= range.d0 && d <= range.d1)
+      inside.emplace_back(t, near.height[k]);
   }
   Strip out;
   out.sigma = prior_m;
@@ -125,12 +129,11 @@ Strip fit_strip(const NearLine& near, const StripRange& range, double noise_m, d
   std::vector<double> sum(static_cast<std::size_t>(chunks), 0), count(sum), place(sum);
   const double length = range.t1 - range.t0, middle = 0.5 * (range.t0 + range.t1);
   for (const auto& [t, height] : inside) {
-    const auto j = static_cast<std::size_t>(std::clamp(static_cast<int>((t - range.t0) / length * chunks), 0, chunks - 1));
+    const auto j = static_cast<std::size_t>(
+        std::clamp(static_cast<int>((t - range.t0) / length * chunks), 0, chunks - 1));
     sum[j] += height, place[j] += t - middle, count[j] += 1;
   }
-  // The slope's prior: the same height at the ends.
-  const double prior = 1 / (prior_m * prior_m);
-  Eigen::Matrix2d information = Eigen::Vector2d(prior, prior * length * length / 12).asDiagonal();
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   for (std::size_t j = 0; j < sum.size(); ++j) {
     if (count[j] < 3) continue;
@@ -139,7 +142,24 @@ Strip fit_strip(const NearLine& near, const StripRange& range, double noise_m, d
     information += weight * row * row.transpose();
     right += weight * (sum[j] / count[j]) * row;
   }
-  const Eigen::Vector2d fitted = information.ldlt().solve(right);
+  if (!(information(0, 0) > 0)) return out;
+  // The plane itself, known from all of its points, unless the strip speaks against it.
+  Eigen::Vector2d fitted = Eigen::Vector2d::Zero();
+  double variance = prior_m * prior_m;
+  const double offset = right[0] / information(0, 0), offset_variance = 1 / information(0, 0);
+  if (offset * offset > kSpeaksAgainst * kSpeaksAgainst * (offset_variance + variance)) {
+    fitted[0] = offset;
+    variance = offset_variance;
+  }
+  if (const double determinant = information.determinant();
+      determinant > 1e-3 * information(0, 0) * information(1, 1)) {
+    const Eigen::Vector2d line = information.inverse() * right;
+    const double slope_variance = information(0, 0) / determinant;
+    if (line[1] * line[1] > kSpeaksAgainst * kSpeaksAgainst * slope_variance) {
+      fitted = line;
+      variance = information(1, 1) / determinant + slope_variance * length * length / 12;
+    }
+  }
   out.offset = fitted[0];
   out.slope = fitted[1];
   double scatter = 0, expected = 0, used = 0;
@@ -150,7 +170,7 @@ Strip fit_strip(const NearLine& near, const StripRange& range, double noise_m, d
     used += 1;
   }
   const double uneven = used > 2 ? std::max(scatter - expected * (used - 2) / used, 0.0) / (used - 2) : 0;
-  out.sigma = std::sqrt(1 / information(0, 0) + uneven);
+  out.sigma = std::sqrt(variance + uneven);
   return out;
 }
 
@@ -163,6 +183,17 @@ Support support_of(const NearLine& near, double bin_m, double gap_m) {
     out.covered[near.place[k].y() > 0 ? 1 : 0][bin] += near.spacing[k] * near.spacing[k];
   }
   return out;
+}
+
+/// Extent of a plane's points across a line, if they were spread evenly.
+double width_across(const SurfacePoints& surface, const FittedPlane& plane, const Line& line) {
+  const Eigen::Vector3d across = line.direction.cross(plane.normal);
+  double sum = 0;
+  for (const std::uint32_t i : plane.points) {
+    const double d = across.dot(surface.position[i].cast<double>() - plane.centre);
+    sum += d * d;
+  }
+  return std::sqrt(12 * sum / static_cast<double>(plane.points.size()));
 }
 
 class CreaseFinder {
@@ -208,6 +239,11 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
   const FittedPlane& b = planes_.planes[static_cast<std::size_t>(pair.second)];
   const double sine = a.normal.cross(b.normal).norm();
   const Line line = intersection(a, b, contact.sum / contact.count);
+  // Narrow strips that turn a little are as likely facets of a rounded body as faces with an edge between
+  // them.
+  if (sine < kFacetSin &&
+      std::max(width_across(surface_, a, line), width_across(surface_, b, line)) < kFacetWidth_m)
+    return {};
   const double gap_m = kAmbiguous * surface_.scale.noise_m / std::max(sine, 0.3);
   const double widest = kBinSpacings * std::max(a.spacing_m, b.spacing_m) * 2 + gap_m;
   const NearLine near_a = near_line(surface_, a, line, widest), near_b = near_line(surface_, b, line, widest);
@@ -269,7 +305,7 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
 }  // namespace
 
 std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& planes,
-                                const std::vector<bool>& curved, const CreaseConfig& config,
+                                const std::vector<bool>& unfit, const CreaseConfig& config,
                                 ThreadPool& pool) {
   const auto contacts = find_contacts(surface, planes);
   std::vector<std::vector<std::int32_t>> beside(planes.planes.size());
@@ -278,8 +314,7 @@ std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& plan
     if (contact.count < 4) continue;
     beside[static_cast<std::size_t>(pair.first)].push_back(pair.second);
     beside[static_cast<std::size_t>(pair.second)].push_back(pair.first);
-    if (curved[static_cast<std::size_t>(pair.first)] || curved[static_cast<std::size_t>(pair.second)])
-      continue;
+    if (unfit[static_cast<std::size_t>(pair.first)] || unfit[static_cast<std::size_t>(pair.second)]) continue;
     const FittedPlane& a = planes.planes[static_cast<std::size_t>(pair.first)];
     const FittedPlane& b = planes.planes[static_cast<std::size_t>(pair.second)];
     if (a.normal.cross(b.normal).norm() < std::sin(config.least_angle_rad)) continue;

@@ -18,14 +18,12 @@ struct CreaseConfig {
   double most_sigma_m = 0.006;    ///< of a piece's place
 };
 
-/// Where two planes meet: pieces of the line in which they intersect, as far as both have points up to it. Near
-/// the line each plane is fitted again to the points beside it: walls carry skirtings, floors sag, scans are
-/// registered to a centimetre.
-/// Ends near a third plane that touches one of the two go to the point where the three meet. `curved` tells
-/// for each plane whether it is a facet of a bent surface: facets beside each other make no crease.
+/// Where two planes meet: pieces of the line in which they intersect, as far as both have points up to it.
+/// Near the line each plane is fitted again to the points beside it: walls carry skirtings, floors sag, scans
+/// are registered to a centimetre. Ends near a third plane that touches one of the two go to the point where
+/// the three meet. Planes that are `unfit` make none.
 std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& planes,
-                                const std::vector<bool>& curved, const CreaseConfig& config,
-                                ThreadPool& pool);
+                                const std::vector<bool>& unfit, const CreaseConfig& config, ThreadPool& pool);
 
 /// For each plane whether its points bend like a cylinder, by more than the noise and over an angle that
 /// matters: a facet of a column, pipe or vault.

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <random>
+
+#include "evpose/core/parallel.h"
+#include "evpose/io/map_h5.h"
+#include "evpose/io/test_files.h"
+#include "evpose/map/triangulation.h"
+#include "evpose/map_build/map_builder.h"
+
+namespace evpose::map_build {
+namespace {
+
+constexpr double kNoise = 0.015;
+
+/// Points of rectangles, each noisy across its surface, as scans from everywhere would have them.
+class Scan {
+ public:
+  explicit Scan(unsigned seed) : random_(seed) {}
+
+  Scan& rectangle(const Eigen::Vector3d& corner, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                  double per_m2 = 2500) {
+    std::uniform_real_distribution<double> share(0, 1);
+    std::normal_distribution<double> noise(0, kNoise);
+    const Eigen::Vector3d normal = a.cross(b).normalized();
+    const auto count = static_cast<int>(per_m2 * a.cross(b).norm());
+    for (int i = 0; i < count; ++i) {
+      const double u = share(random_), v = share(random_);
+      cloud_.points.push_back((corner + u * a + v * b + noise(random_) * normal).cast<float>());
+    }
+    return *this;
+  }
+  PointCloud cloud() const { return cloud_; }
+
+ private:
+  std::mt19937 random_;
+  PointCloud cloud_;
+};
+
+/// Floor and two walls that meet at the origin, turned so that nothing lies along an axis.
+PointCloud room_corner(unsigned seed) {
+  Scan scan(seed);
+  scan.rectangle({0, 0, 0}, {1.5, 0, 0}, {0, 1.2, 0});
+  scan.rectangle({0, 0, 0}, {0, 1.2, 0}, {0, 0, 1});
+  scan.rectangle({0, 0, 0}, {0, 0, 1}, {1.5, 0, 0});
+  return scan.cloud();
+}
+
+Expected<BuiltMap> build(const PointCloud& cloud, int threads = 1) {
+  ThreadPool pool(threads);
+  return build_map(cloud, {}, pool, [](double) { return true; });
+}
+
+TEST(SurfacePoints, NoiseAndSpacingOfAPlaneAreWhatTheyWereMadeWith) {
+  const auto scale =
+      measure_scale(Scan(1).rectangle({0, 0, 0}, {2, 0, 0}, {0, 2, 0}).cloud().points, {}, "scan");
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->noise_m, kNoise, 0.1 * kNoise);
+  EXPECT_NEAR(scale->spacing_m, 0.02, 0.002);
+}
+
+TEST(SurfacePoints, NormalsAreKnownAsWellAsWasAskedFor) {
+  ThreadPool pool(2);
+  const auto points = Scan(2).rectangle({0, 0, 0}, {2, 0, 0}, {0, 2, 0}).cloud().points;
+  const PatchConfig config;
+  const auto surface = describe_surface(points, *measure_scale(points, config, "scan"), config, pool);
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    const auto& p = surface.position[i];
+    if (p.x() < 0.2F || p.x() > 1.8F || p.y() < 0.2F || p.y() > 1.8F) continue;
+    sum += surface.normal[i].head<2>().cast<double>().squaredNorm();
+    ++count;
+  }
+  // Two tilts.
+  const double sigma = std::sqrt(sum / count / 2);
+  EXPECT_LT(sigma, 1.3 * config.normal_sigma_rad);
+  EXPECT_GT(sigma, 0.5 * config.normal_sigma_rad);
+}
+
+TEST(MapBuilder, CreasesOfACornerMeetInItToTwoMillimetres) {
+  const auto built = build(room_corner(3));
+  ASSERT_TRUE(built) << built.error().line();
+  EXPECT_EQ(built->figures.planes, 3U);
+  Eigen::Vector3d covered = Eigen::Vector3d::Zero();
+  double squares = 0;
+  for (std::size_t i = 0; i < built->map.points.size(); ++i) {
+    const ContourPoint& p = built->map.points[i];
+    if (p.kind != ContourKind::crease) continue;
+    const Eigen::Vector3d x = built->map.position(i);
+    Eigen::Index axis = 0;
+    p.tangent.cwiseAbs().maxCoeff(&axis);
+    Eigen::Vector3d across = x;
+    across[axis] = 0;
+    EXPECT_LT(across.norm(), 0.004);
+    squares += across.squaredNorm() * static_cast<double>(p.length);
+    covered[axis] += static_cast<double>(p.length);
+    // Out of both surfaces: towards the negative octant.
+    EXPECT_LT(p.normal.dot(Eigen::Vector3f::Ones()), -0.9F);
+    EXPECT_LT(p.normal_b.dot(Eigen::Vector3f::Ones()), -0.9F);
+  }
+  EXPECT_LT(std::sqrt(squares / covered.sum()), 0.002);
+  EXPECT_NEAR(covered.x(), 1.5, 0.06);
+  EXPECT_NEAR(covered.y(), 1.2, 0.06);
+  EXPECT_NEAR(covered.z(), 1.0, 0.06);
+}
+
+TEST(MapBuilder, APlateEndsWhereItEndsWhateverItsDensity) {
+  for (const double per_m2 : {1200.0, 5000.0}) {
+    double inset = 0, length = 0;
+    for (unsigned seed = 0; seed < 3; ++seed) {
+      const auto built =
+          build(Scan(seed).rectangle({-0.6, -0.4, 0}, {1.2, 0, 0}, {0, 0.8, 0}, per_m2).cloud());
+      ASSERT_TRUE(built) << built.error().line();
+      for (std::size_t i = 0; i < built->map.points.size(); ++i) {
+        const ContourPoint& p = built->map.points[i];
+        const Eigen::Vector3d x = built->map.position(i);
+        EXPECT_EQ(p.kind, ContourKind::boundary);
+        const bool side = std::abs(p.tangent.y()) > 0.5F;
+        const double outwards = side ? std::abs(x.x()) - 0.6 : std::abs(x.y()) - 0.4;
+        EXPECT_LT(std::abs(outwards), 0.02);
+        inset += outwards * static_cast<double>(p.length);
+        length += static_cast<double>(p.length);
+      }
+    }
+    EXPECT_GT(length, 3 * 2.0);
+    EXPECT_LT(std::abs(inset / length), 0.15 / std::sqrt(per_m2));
+  }
+}
+
+TEST(MapBuilder, TheSameBytesForAnyNumberOfThreads) {
+  const auto one = build(room_corner(4), 1), three = build(room_corner(4), 3);
+  ASSERT_TRUE(one && three);
+  ASSERT_EQ(one->map.points.size(), three->map.points.size());
+  for (std::size_t i = 0; i < one->map.points.size(); ++i)
+    EXPECT_EQ(one->map.points[i].position, three->map.points[i].position);
+}
+
+TEST(MapBuilder, WhatIsNoSurfaceIsNamed) {
+  Scan line(5), sparse(6);
+  PointCloud on_a_line;
+  for (int i = 0; i < 1000; ++i) on_a_line.points.emplace_back(0.001F * static_cast<float>(i), 0.0F, 0.0F);
+  const auto a = build(on_a_line);
+  ASSERT_FALSE(a);
+  EXPECT_NE(a.error().what.find("lines"), std::string::npos);
+  PointCloud fog;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> share(0, 1);
+  for (int i = 0; i < 3000; ++i) fog.points.emplace_back(share(random), share(random), share(random));
+  EXPECT_FALSE(build(fog));
+  PointCloud same;
+  same.points.assign(1000, Eigen::Vector3f(1, 2, 3));
+  EXPECT_FALSE(build(same));
+  EXPECT_FALSE(build(PointCloud()));
+}
+
+TEST(MapBuilder, ACylinderHasNoEdgesAlongIt) {
+  PointCloud cloud;
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> share(0, 1);
+  std::normal_distribution<double> noise(0, kNoise);
+  for (int i = 0; i < 9000; ++i) {
+    const double angle = 2 * M_PI * share(random), r = 0.25 + noise(random);
+    cloud.points.emplace_back(
+        Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), 2 * share(random)).cast<float>());
+  }
+  const auto built = build(cloud);
+  double along = 0;
+  if (built)
+    for (const auto& p : built->map.points)
+      along += std::abs(p.tangent.z()) > 0.9F ? static_cast<double>(p.length) : 0;
+  EXPECT_LT(along, 0.5);
+}
+
+TEST(StepFit, FindsTheEdgeOfADensityWithinItsOwnError) {
+  std::mt19937 random(9);
+  double squares = 0;
+  constexpr int kTrials = 60;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::uniform_real_distribution<double> t(-0.5, 0.5), d(-0.1, 0.013);
+    std::normal_distribution<double> blur(0, 0.008);
+    std::vector<Eigen::Vector2d> points;
+    for (int i = 0; i < 250; ++i) {
+      const Eigen::Vector2d p(t(random), d(random) + blur(random));
+      if (std::abs(p.y()) < 0.08) points.push_back(p);
+    }
+    const StepFit step = fit_step(points, 0.5, 0.08, 0.008);
+    ASSERT_TRUE(step.converged);
+    squares += std::pow((step.place - 0.013) / step.sigma_place, 2);
+    EXPECT_LT(step.sigma_place, 0.003);
+  }
+  EXPECT_NEAR(squares / kTrials, 1, 0.6);
+}
+
+TEST(Outline, HasTheAreaOfThePlateWithoutItsHole) {
+  ThreadPool pool(1);
+  Scan scan(10);  // a frame of four boards around a hole of 0.6 x 0.4
+  scan.rectangle({0, 0, 0}, {1.2, 0, 0}, {0, 0.3, 0}, 8000)
+      .rectangle({0, 0.7, 0}, {1.2, 0, 0}, {0, 0.3, 0}, 8000);
+  scan.rectangle({0, 0.3, 0}, {0.3, 0, 0}, {0, 0.4, 0}, 8000)
+      .rectangle({0.9, 0.3, 0}, {0.3, 0, 0}, {0, 0.4, 0}, 8000);
+  const auto points = scan.cloud().points;
+  const auto surface = describe_surface(points, *measure_scale(points, {}, "scan"), {}, pool);
+  const Planes planes = find_planes(surface, {});
+  ASSERT_EQ(planes.planes.size(), 1U);
+  const Outline outline = trace_outline(surface, planes.planes[0]);
+  ASSERT_EQ(outline.rings.size(), 2U);
+  EXPECT_EQ(outline.rings[1].hole_of, 0);
+  EXPECT_GT(twice_area(outline.rings[0].corners), 0);
+  EXPECT_NEAR(0.5 * (twice_area(outline.rings[0].corners) + twice_area(outline.rings[1].corners)), 1.2 - 0.24,
+              0.08);
+}
+
+TEST(MapFile, KeepsPlanesAndPolygonsAndTheyHide) {
+  auto built = build(room_corner(11));
+  ASSERT_TRUE(built);
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.h5";
+  ASSERT_TRUE(write_map_h5(path, built->map));
+  const auto read = read_map_h5(path);
+  ASSERT_TRUE(read) << read.error().line();
+  ASSERT_EQ(read->planes.size(), built->map.planes.size());
+  EXPECT_EQ(read->planes[1].d, built->map.planes[1].d);
+  ASSERT_EQ(read->polygons.size(), built->map.polygons.size());
+  EXPECT_EQ(read->polygons[0].vertices, built->map.polygons[0].vertices);
+  EXPECT_EQ(read->occluders.triangles, built->map.occluders.triangles);
+  EXPECT_FALSE(read->occluders.triangles.empty());
+  EXPECT_EQ(read->points[0].normal_b, built->map.points[0].normal_b);
+}
+
+TEST(Triangulation, CoversTheRingButNotItsHole) {
+  const MapPlane plane{Eigen::Vector3f(0.6F, 0, 0.8F), 0, 0, 0};
+  const auto at = [](float x, float y) { return Eigen::Vector3f(0.8F * x, y, -0.6F * x); };
+  MapPolygon outer{{at(0, 0), at(4, 0), at(4, 3), at(2, 1), at(0, 3)}, 0, -1};
+  MapPolygon hole{{at(0.5F, 0.5F), at(0.5F, 1), at(1, 1), at(1, 0.5F)}, 0, 0};
+  const TriangleMesh mesh = triangulated({plane}, {outer, hole});
+  double area = 0;
+  for (const auto& t : mesh.triangles)
+    area += 0.5 * static_cast<double>((mesh.vertices[t[1]] - mesh.vertices[t[0]])
+                                          .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]])
+                                          .norm());
+  EXPECT_NEAR(area, 12 - 4 - 0.25, 1e-4);
+}
+
+}  // namespace
+}  // namespace evpose::map_build

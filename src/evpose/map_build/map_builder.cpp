@@ -110,7 +110,10 @@ void describe(ConfigTable& table, BuildConfig& c) {
             {0.01, 1});
   table.add("plane_gate", c.plane.gate_sigma, "", "most distance from a plane, in units of the noise",
             {1, 10});
-  table.add("plane_points", c.plane.least_points, "", "least of a plane", {10, 1e6});
+  table.add("plane_patches", c.plane.least_patches, "",
+            "least points of a plane, in patches that tell a normal", {1, 1e6});
+  table.add("plane_rough", c.plane.most_rough, "", "roughest plane that has contours, in units of the noise",
+            {1, 100});
   table.add("crease_angle", c.crease.least_angle_rad, "rad", "least between two planes that make a crease",
             {0.05, 1.5});
   table.add("crease_length", c.crease.least_length_m, "m", "least of a crease", {0, 10});
@@ -138,7 +141,10 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   if (planes.planes.empty()) return Error{cloud.source, "no plane has enough points", "give a denser cloud"};
   if (!progress(0.8)) return kGivenUp;
   const std::vector<bool> curved = find_curved(surface, planes);
-  const std::vector<Piece> creases = find_creases(surface, planes, curved, config.crease, pool);
+  std::vector<bool> unfit = curved;  // for contours: bent, or a mixture of surfaces
+  for (std::size_t p = 0; p < unfit.size(); ++p)
+    unfit[p] = unfit[p] || planes.planes[p].rms_m > config.plane.most_rough * scale->noise_m;
+  const std::vector<Piece> creases = find_creases(surface, planes, unfit, config.crease, pool);
   if (!progress(0.85)) return kGivenUp;
   const Neighbours tree(surface.position);
   std::vector<std::vector<Piece>> pieces(planes.planes.size());
@@ -150,7 +156,7 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   pool.for_chunks(planes.planes.size(), 1, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       outlines[p] = trace_outline(surface, planes.planes[p]);
-      if (curved[p]) continue;
+      if (unfit[p]) continue;
       boundaries[p] = find_boundaries(surface, tree, planes.planes[p], static_cast<std::int32_t>(p),
                                       outlines[p], pieces[p], config.boundary);
     }

@@ -55,6 +55,7 @@ class Growing {
         config_(config),
         gate_m_(config.gate_sigma * surface.scale.noise_m),
         cos_(static_cast<float>(std::cos(config.angle_rad))),
+        least_points_(config.least_patches * surface.scale.neighbours),
         label_(surface.size(), -1) {}
 
   void grow_all();
@@ -74,6 +75,7 @@ class Growing {
   const PlaneConfig& config_;
   double gate_m_;
   float cos_;
+  double least_points_;
   std::vector<std::int32_t> label_;  ///< -2: tried and left as a seed
   std::vector<Moments> moments_;
   std::vector<std::uint32_t> region_;
@@ -104,7 +106,7 @@ void Growing::grow(std::uint32_t seed) {
   region_.assign(1, seed);
   label_[seed] = number;
   moments.add(at(seed));
-  double refit_at = config_.least_points / 2;
+  double refit_at = least_points_ / 2;
   for (std::size_t next = 0; next < region_.size(); ++next) {
     const std::uint32_t* near = links(region_[next]);
     for (int k = 0; k < SurfacePoints::kLinks; ++k) {
@@ -122,7 +124,7 @@ void Growing::grow(std::uint32_t seed) {
       refit_at = 1.5 * moments.count;
     }
   }
-  bool keep = moments.count >= config_.least_points;
+  bool keep = moments.count >= least_points_;
   if (keep) {
     plane = fit(moments);
     // Flat means: wider than thick both ways.
@@ -144,8 +146,8 @@ void Growing::grow(std::uint32_t seed) {
   moments_.push_back(kept);
 }
 
-/// A bend between two planes looks flat to patches that reach into both. What lies in the planes beside it, but
-/// for the noise, is no plane of its own.
+/// A bend between two planes looks flat to patches that reach into both. What lies in the planes beside it,
+/// but for the noise, is no plane of its own.
 void Growing::dissolve_bends() {
   const std::size_t count = moments_.size();
   std::vector<std::vector<std::uint32_t>> members(count);
@@ -229,7 +231,7 @@ void Growing::merge_flush() {
       return fab.normal.dot(about * fab.normal) + off * off;
     };
     const double angle_cos = std::abs(fa.normal.dot(fb.normal));
-    const bool small = std::min(ma.count, mb.count) < 4 * config_.least_points;
+    const bool small = std::min(ma.count, mb.count) < 4 * least_points_;
     if (angle_cos < std::cos(small ? 4 * config_.merge_rad : config_.merge_rad)) continue;
     if (thickness(ma) > fa.values[0] + slack || thickness(mb) > fb.values[0] + slack) continue;
     ma = both;

@@ -12,10 +12,10 @@
 namespace evpose::map_build {
 namespace {
 
-constexpr std::size_t kSample = 2000;     // points that the scale is measured at
-constexpr int kLargestSamplePatch = 400;  // points
-constexpr double kFlat = 0.05;            // thickness^2 over width^2 of a patch that counts as flat
-constexpr std::size_t kFewest = 50;       // points of a cloud
+constexpr std::size_t kSample = 1000;      // points that the scale is measured at
+constexpr int kLargestSamplePatch = 1000;  // points
+constexpr double kFlat = 0.1;              // thickness^2 over width^2 of a patch that counts as flat
+constexpr std::size_t kFewest = 50;        // points of a cloud
 
 /// Sums over a growing patch, relative to its middle point.
 struct Moments {

@@ -6,9 +6,13 @@
 #include <set>
 
 #include "commands.h"
+#include "evpose/camera/camera.h"
+#include "evpose/io/atomic_file.h"
 #include "evpose/io/contour_files.h"
 #include "evpose/io/map_h5.h"
 #include "evpose/io/ply.h"
+#include "evpose/report/map_accuracy.h"
+#include "evpose/report/map_page.h"
 
 namespace evpose {
 namespace {
@@ -25,17 +29,41 @@ int import_map(const std::string& contours, const std::string& occluders, const 
   return 0;
 }
 
-int print_map(const std::string& path) {
-  const auto map = read_contour_map(path);
-  if (!map) return bad_input(map.error());
-  const MapFigures f = figures_of(*map);
-  std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map->points.size(), f.contours,
+int print_map(const ContourMap& map) {
+  const MapFigures f = figures_of(map);
+  std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map.points.size(), f.contours,
               f.length_m);
   std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", f.low.x(), f.high.x(),
               f.low.y(), f.high.y(), f.low.z(), f.high.z());
-  std::printf("occluders  %zu triangles\nframe      %s\n", map->occluders.triangles.size(),
-              map->frame.c_str());
+  std::printf("occluders  %zu triangles\nframe      %s\n", map.occluders.triangles.size(), map.frame.c_str());
   return 0;
+}
+
+int write_report(const ContourMap& map, const std::string& path, double pitch_deg,
+                 std::vector<double> heights_m) {
+  const auto camera = make_camera({460, 460, 319.5, 239.5, "none", {}, {640, 480}});
+  if (!camera) return bad_input(camera.error());
+  if (heights_m.empty()) {
+    const MapFigures f = figures_of(map);
+    for (const double share : {0.25, 0.5}) heights_m.push_back(f.low.z() + share * (f.high.z() - f.low.z()));
+  }
+  constexpr int kCells = 20;
+  const double pitch = pitch_deg / 57.29577951;
+  const AccuracySurvey survey = survey_accuracy(map, **camera, pitch, heights_m, kCells);
+  if (const auto ok = write_text_file(path, map_page(map, survey, pitch)); !ok) return bad_input(ok.error());
+  return 0;
+}
+
+/// By the name's end: .ply contours, .obj lines and outlines, .svg the plan, .h5 the map again.
+int export_map(const std::string& input, const std::string& output) {
+  const auto map = read_contour_map(input);
+  if (!map) return bad_input(map.error());
+  Status done = Error{output, "export knows .ply, .obj, .svg and .h5", "choose one of them"};
+  if (output.ends_with(".ply")) done = write_ply_contours(output, *map);
+  if (output.ends_with(".obj")) done = write_obj_map(output, *map);
+  if (output.ends_with(".svg")) done = write_text_file(output, map_drawing(*map, 0));
+  if (output.ends_with(".h5")) done = write_map_h5(output, *map);
+  return done ? 0 : bad_input(done.error());
 }
 
 }  // namespace
@@ -60,7 +88,9 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   map->require_subcommand(1);
   add_map_build(*map, run);
   struct Options {
-    std::string input, occluders, output = "map.h5";
+    std::string input, occluders, output = "map.h5", report;
+    double pitch_deg = 30;
+    std::vector<double> heights_m;
   };
   auto o = std::make_shared<Options>();
   auto* import = map->add_subcommand("import", "Make a map file from contour points (PLY, PCD)");

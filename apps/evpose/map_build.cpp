@@ -13,6 +13,7 @@
 #include "evpose/io/config_yaml.h"
 #include "evpose/io/contour_files.h"
 #include "evpose/io/map_h5.h"
+#include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
 #include "interrupt.h"
 #include "progress.h"
@@ -24,6 +25,7 @@ struct BuildRequest {
   std::string cloud, output = "map.h5";
   std::vector<std::string> assignments;
   int threads = 1;
+  bool level = false;
 };
 
 int build(const BuildRequest& request) {
@@ -38,13 +40,15 @@ int build(const BuildRequest& request) {
   const InterruptGuard guard;
   ThreadPool pool(request.threads);
   Progress progress("building");
-  const auto built = map_build::build_map(*std::move(cloud), config, pool, [&](double share) {
+  auto built = map_build::build_map(*std::move(cloud), config, pool, [&](double share) {
     progress.at(share);
     return !InterruptGuard::interrupted();
   });
   progress.done();
   if (InterruptGuard::interrupted()) return kInterruptedStatus;
   if (!built) return bad_input(built.error());
+  const map_build::UpDirection up = map_build::find_up(built->map);
+  if (request.level && up.known) map_build::level(built->map, up.up);
   if (const auto ok = write_map_h5(request.output, built->map); !ok) return bad_input(ok.error());
   const auto& f = built->figures;
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -56,6 +60,15 @@ int build(const BuildRequest& request) {
       f.points, 100 * f.scale.spacing_m, 1e3 * f.scale.noise_m, f.scale.neighbours, f.planes,
       100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved, f.crease_m,
       f.boundary_m, f.shadow_m, wall_s);
+  if (!up.known)
+    std::printf("up         unknown: neither a floor nor walls of two directions%s\n",
+                request.level ? "; not levelled" : "");
+  else
+    std::printf("up         %.4f %.4f %.4f, %.2f deg from z%s\n", up.up.x(), up.up.y(), up.up.z(),
+                up.tilt_rad * 57.29577951,
+                request.level          ? "; levelled"
+                : up.tilt_rad > 0.0009 ? "; --level turns the map"
+                                       : "");
   return 0;
 }
 
@@ -99,6 +112,7 @@ void add_map_build(CLI::App& map, std::function<int()>& run) {
   command->add_option("cloud", request->cloud, "points in metres, of one frame")->required();
   command->add_option("-o,--output", request->output, "map file")->capture_default_str();
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
+  command->add_flag("--level", request->level, "turn the map so that up, as floors and walls say, is z");
   command->add_option("--threads", request->threads, "that work; the map is the same for any number")
       ->capture_default_str()
       ->check(CLI::Range(1, 256));

@@ -187,6 +187,33 @@ Status write_ply_contours(const std::string& path, const ContourMap& map) {
   return file->commit();
 }
 
+Status write_obj_map(const std::string& path, const ContourMap& map) {
+  auto file = AtomicFile::create(path);
+  if (!file) return file.error();
+  const auto vertex = [&](const Eigen::Vector3d& p) {
+    file->write(text("v ", p.x(), " ", p.y(), " ", p.z(), "\n"));
+  };
+  file->write("# map frame, metres\no contours\n");
+  std::size_t next = 1;
+  for (std::size_t i = 0; i < map.points.size(); ++i, next += 2) {
+    const Eigen::Vector3d half =
+        0.5 * static_cast<double>(map.points[i].length) * map.points[i].tangent.cast<double>();
+    vertex(map.position(i) - half);
+    vertex(map.position(i) + half);
+    file->write(text("l ", next, " ", next + 1, "\n"));
+  }
+  file->write("o outlines\n");
+  for (const MapPolygon& polygon : map.polygons) {
+    for (const auto& v : polygon.vertices) vertex(map.anchor + v.cast<double>());
+    std::string line = "l";
+    for (std::size_t k = 0; k <= polygon.vertices.size() && !polygon.vertices.empty(); ++k)
+      line += text(" ", next + k % polygon.vertices.size());
+    file->write(line + "\n");
+    next += polygon.vertices.size();
+  }
+  return file->commit();
+}
+
 Status write_ply_cloud(const std::string& path, const std::vector<CloudPoint>& points) {
   auto file = AtomicFile::create(path);
   if (!file) return file.error();

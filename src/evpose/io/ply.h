@@ -28,6 +28,10 @@ Expected<TriangleMesh> read_ply_mesh(const std::string& path, const Eigen::Vecto
 /// contours.ply with every property of formats 2.1 that ContourMap holds.
 Status write_ply_contours(const std::string& path, const ContourMap& map);
 
+/// Wavefront OBJ of a map: contours as lines (object `contours`), outlines of the planes as closed lines
+/// (object `outlines`), map frame, metres.
+Status write_obj_map(const std::string& path, const ContourMap& map);
+
 /// A point as a LiDAR gives it.
 struct CloudPoint {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< map frame, metres

@@ -123,14 +123,20 @@ class BoundaryFinder {
         outline_(outline),
         creases_(creases),
         config_(config) {
-    for (const std::uint32_t i : plane.points)
-      flat_.push_back(frame_.flat(surface.position[i].cast<double>()));
+    for (const std::uint32_t i : plane.points) add_point(surface.position[i].cast<double>());
     free_side_ = side_of_the_rest(surface, plane);
   }
 
   Boundaries find(std::int32_t number) const;
 
  private:
+  void add_point(const Eigen::Vector3d& x) {
+    flat_.push_back(frame_.flat(x));
+    height_.push_back(plane_.distance(x));
+  }
+  std::vector<Eigen::Vector2d> own_points(const Eigen::Vector2d& middle, const Eigen::Vector2d& along,
+                                          const Eigen::Vector2d& out, double half_length,
+                                          double half_width) const;
   bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
   bool goes_on(const Piece& piece) const;
   bool covered(const Piece& piece) const;
@@ -144,6 +150,7 @@ class BoundaryFinder {
   const std::vector<Piece>& creases_;
   const BoundaryConfig& config_;
   std::vector<Eigen::Vector2d> flat_;
+  std::vector<double> height_;  ///< of the same points over the plane
   double free_side_ = 0;
 };
 
@@ -220,6 +227,32 @@ double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) 
   return below > kNearlyAll * (above + below) ? -1 : 0;
 }
 
+/// Points of the plane in a strip around an edge, in its coordinates. A face that hangs from the edge lies on
+/// one side of the plane, and its points near the edge pass for the plane's; those on the other side are the
+/// plane's own.
+std::vector<Eigen::Vector2d> BoundaryFinder::own_points(const Eigen::Vector2d& middle,
+                                                        const Eigen::Vector2d& along,
+                                                        const Eigen::Vector2d& out, double half_length,
+                                                        double half_width) const {
+  std::vector<Eigen::Vector2d> all, half[2];
+  double at_edge[2] = {0, 0}, within[2] = {0, 0};
+  for (std::size_t k = 0; k < flat_.size(); ++k) {
+    const Eigen::Vector2d local(along.dot(flat_[k] - middle), out.dot(flat_[k] - middle));
+    if (std::abs(local.x()) > half_length || std::abs(local.y()) > half_width) continue;
+    const int side = height_[k] > 0 ? 1 : 0;
+    all.push_back(local);
+    half[side].push_back(local);
+    (local.y() > -surface_.scale.noise_m ? at_edge : within)[side] += 1;
+  }
+  // Both halves, unless one has more at the edge than chance gives it beside the other.
+  const double expected = within[0] + within[1] > 0 ? within[1] / (within[0] + within[1]) : 0.5;
+  const double edge = at_edge[0] + at_edge[1];
+  const double sigma = std::sqrt(std::max(edge * expected * (1 - expected), 1.0));
+  const double excess = at_edge[1] - edge * expected;
+  if (std::abs(excess) < 2 * sigma) return all;
+  return half[excess > 0 ? 0 : 1];
+}
+
 bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const {
   Eigen::Vector2d along = (b - a).normalized(), out(along.y(), -along.x());  // the surface is on the left
   Eigen::Vector2d middle = 0.5 * (a + b);
@@ -227,11 +260,7 @@ bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Pie
   const double half_width = 2.5 * outline_.cell_m;
   StepFit best;
   for (int round = 0; round < 2; ++round) {
-    std::vector<Eigen::Vector2d> strip;
-    for (const auto& p : flat_) {
-      const Eigen::Vector2d local(along.dot(p - middle), out.dot(p - middle));
-      if (std::abs(local.x()) <= half_length && std::abs(local.y()) <= half_width) strip.push_back(local);
-    }
+    const std::vector<Eigen::Vector2d> strip = own_points(middle, along, out, half_length, half_width);
     // The softness of the edge: that which makes the points likeliest.
     double likeliest = -INFINITY;
     best = StepFit();

@@ -93,17 +93,29 @@ void add_map(CLI::App& app, std::function<int()>& run) {
     std::vector<double> heights_m;
   };
   auto o = std::make_shared<Options>();
-  auto* import = map->add_subcommand("import", "Make a map file from contour points (PLY, PCD)");
-  import->add_option("contours", o->input, "contours.ply, or any cloud of edge points")->required();
-  import->add_option("--occluders", o->occluders, "PLY mesh that hides contours behind it");
-  import->add_option("-o,--output", o->output, "map file")->capture_default_str();
-  const auto run_import = [o] { return import_map(o->input, o->occluders, o->output); };
-  import->callback([&run, run_import] { run = run_import;
-});
-auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
-info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
-info->callback([o, &run] { run = [o] { return print_map(o->input); }; });
-add_map_compare(*map, run);
-}  // namespace evpose
+  auto* from_contours = map->add_subcommand("import", "Make a map file from contour points (PLY, PCD)");
+  from_contours->add_option("contours", o->input, "contours.ply, or any cloud of edge points")->required();
+  from_contours->add_option("--occluders", o->occluders, "PLY mesh that hides contours behind it");
+  from_contours->add_option("-o,--output", o->output, "map file")->capture_default_str();
+  from_contours->callback([o, &run] { run = [o] { return import_map(o->input, o->occluders, o->output); }; });
+  auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
+  info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
+  info->add_option("--report", o->report, "write the quality report, one HTML file");
+  info->add_option("--pitch", o->pitch_deg, "of the report's camera, degrees down")->capture_default_str();
+  info->add_option("--heights", o->heights_m, "z of the report's cameras, m")->delimiter(',');
+  info->callback([o, &run] {
+    run = [o] {
+      const auto read = read_contour_map(o->input);
+      if (!read) return bad_input(read.error());
+      const int status = print_map(*read);
+      return o->report.empty() ? status : write_report(*read, o->report, o->pitch_deg, o->heights_m);
+    };
+  });
+  auto* write = map->add_subcommand("export", "A map for other programs: .ply, .obj, .svg");
+  write->add_option("map", o->input, "map.h5, PLY or PCD")->required();
+  write->add_option("-o,--output", o->output, "file")->required();
+  write->callback([o, &run] { run = [o] { return export_map(o->input, o->output); }; });
+  add_map_compare(*map, run);
+}
 
 }  // namespace evpose

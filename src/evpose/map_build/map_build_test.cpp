@@ -9,6 +9,7 @@
 #include "evpose/io/map_h5.h"
 #include "evpose/io/test_files.h"
 #include "evpose/map/triangulation.h"
+#include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
 
 namespace evpose::map_build {
@@ -229,6 +230,32 @@ TEST(MapFile, KeepsPlanesAndPolygonsAndTheyHide) {
   EXPECT_EQ(read->occluders.triangles, built->map.occluders.triangles);
   EXPECT_FALSE(read->occluders.triangles.empty());
   EXPECT_EQ(read->points[0].normal_b, built->map.points[0].normal_b);
+}
+
+TEST(Gravity, ATiltedRoomIsLevelledByItsFloorAndWalls) {
+  const Eigen::AngleAxisd tilt(0.047, Eigen::Vector3d(1, 2, 0).normalized());
+  PointCloud cloud = room_corner(12);
+  for (auto& p : cloud.points) p = (tilt * p.cast<double>()).cast<float>();
+  auto built = build(cloud);
+  ASSERT_TRUE(built);
+  const UpDirection up = find_up(built->map);
+  ASSERT_TRUE(up.known);
+  EXPECT_LT((up.up - tilt * Eigen::Vector3d::UnitZ()).norm(), 0.002);
+  EXPECT_NEAR(up.tilt_rad, 0.047, 0.002);
+  level(built->map, up.up);
+  EXPECT_LT(find_up(built->map).tilt_rad, 1e-4);
+  for (const auto& plane : built->map.planes) {
+    const auto upright = static_cast<double>(std::abs(plane.normal.z()));
+    EXPECT_LT(std::min(upright, 1 - upright), 0.01);
+  }
+}
+
+TEST(Gravity, WallsOfOneDirectionLeaveItUnknown) {
+  ContourMap map;
+  map.planes.push_back({Eigen::Vector3f::UnitX(), 0, 1000, 0.01F});
+  EXPECT_FALSE(find_up(map).known);
+  map.planes.push_back({Eigen::Vector3f::UnitY(), 0, 1000, 0.01F});
+  EXPECT_TRUE(find_up(map).known);
 }
 
 TEST(Triangulation, CoversTheRingButNotItsHole) {

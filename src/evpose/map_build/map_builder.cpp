@@ -100,6 +100,20 @@ void add_polygons(const FittedPlane& plane, std::int32_t number, const Outline& 
   }
 }
 
+/// Rms of the plane that half of the points lie on smoother planes than.
+double typical_roughness(const Planes& planes) {
+  std::vector<std::pair<double, std::size_t>> by_roughness;
+  std::size_t all = 0, so_far = 0;
+  for (const FittedPlane& plane : planes.planes) {
+    by_roughness.emplace_back(plane.rms_m, plane.points.size());
+    all += plane.points.size();
+  }
+  std::sort(by_roughness.begin(), by_roughness.end());
+  for (const auto& [rms, points] : by_roughness)
+    if (2 * (so_far += points) >= all) return rms;
+  return 0;
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, BuildConfig& c) {
@@ -112,8 +126,8 @@ void describe(ConfigTable& table, BuildConfig& c) {
             {1, 10});
   table.add("plane_patches", c.plane.least_patches, "",
             "least points of a plane, in patches that tell a normal", {1, 1e6});
-  table.add("plane_rough", c.plane.most_rough, "", "roughest plane that has contours, in units of the noise",
-            {1, 100});
+  table.add("plane_rough", c.plane.most_rough, "",
+            "roughest plane that has contours, in units of the typical rms", {1, 100});
   table.add("crease_angle", c.crease.least_angle_rad, "rad", "least between two planes that make a crease",
             {0.05, 1.5});
   table.add("crease_length", c.crease.least_length_m, "m", "least of a crease", {0, 10});
@@ -142,8 +156,8 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   if (!progress(0.8)) return kGivenUp;
   const std::vector<bool> curved = find_curved(surface, planes);
   std::vector<bool> unfit = curved;  // for contours: bent, or a mixture of surfaces
-  for (std::size_t p = 0; p < unfit.size(); ++p)
-    unfit[p] = unfit[p] || planes.planes[p].rms_m > config.plane.most_rough * scale->noise_m;
+  const double roughest_m = config.plane.most_rough * typical_roughness(planes);
+  for (std::size_t p = 0; p < unfit.size(); ++p) unfit[p] = unfit[p] || planes.planes[p].rms_m > roughest_m;
   const std::vector<Piece> creases = find_creases(surface, planes, unfit, config.crease, pool);
   if (!progress(0.85)) return kGivenUp;
   const Neighbours tree(surface.position);

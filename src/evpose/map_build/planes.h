@@ -34,9 +34,9 @@ struct Planes {
 struct PlaneConfig {
   double angle_rad = 0.30;   ///< most between a point's normal and its plane
   double gate_sigma = 3;     ///< most distance of a point from its plane, in units of the noise
-  double least_patches = 3;  ///< points of a plane, in patches that tell a normal
-  double most_rough =
-      1.2;  ///< rms of a plane that has contours, in units of the noise: shelves of books are rougher
+  double least_patches = 1;  ///< points of a plane, in patches that tell a normal
+  /// Rms of a plane that has contours, in units of the typical plane's.
+  double most_rough = 2;
   double merge_rad = 0.026;  ///< planes that touch and agree to this angle and to the noise become one
 };
 

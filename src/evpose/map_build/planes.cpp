@@ -10,7 +10,8 @@
 namespace evpose::map_build {
 namespace {
 
-constexpr double kBendNoise = 1.2;  // rms distance from the planes beside it, in units of the noise
+constexpr double kFewestPoints = 40;  // of a plane, however small the patches
+constexpr double kBendNoise = 1.2;    // rms distance from the planes beside it, in units of the noise
 
 /// Sums of a region's points.
 struct Moments {
@@ -55,7 +56,7 @@ class Growing {
         config_(config),
         gate_m_(config.gate_sigma * surface.scale.noise_m),
         cos_(static_cast<float>(std::cos(config.angle_rad))),
-        least_points_(config.least_patches * surface.scale.neighbours),
+        least_points_(std::max(kFewestPoints, config.least_patches * surface.scale.neighbours)),
         label_(surface.size(), -1) {}
 
   void grow_all();

@@ -2,14 +2,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs clang-tidy over the sources of a build: scripts/tidy.py BUILD [NAME ...]
 
-Only files whose path contains one of the NAMEs; without any, all of apps and src but the unit tests. A file that
-passed is not looked at again until it, what it includes, its flags or .clang-tidy change.
+Only files whose path contains one of the NAMEs, each by itself; without any, all of apps and src but the unit tests,
+in batches: most of the time goes into the headers of libraries, which the files of a batch share. Files stand together
+only where the names that they define for themselves allow it, and a batch with faults is looked at again file by file.
+What passed is not looked at again until it, what it includes, its flags or .clang-tidy change.
 """
 import concurrent.futures
 import hashlib
 import json
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import subprocess
@@ -18,36 +21,83 @@ import time
 
 TOOL = "clang-tidy-14"
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+MOST_IN_BATCH = 16
+WORD = re.compile(r"[A-Za-z_]\w*")
+# What a file defines for itself: types, constants and functions at the left margin of its unnamed namespace; macros.
+OWN = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.MULTILINE | re.DOTALL)
+DEFINED = re.compile(r"^(?:(?:struct|class|enum class|enum|union|using|namespace) (\w+)"
+                     r"|[\w:][\w:<>,&* ]*?\b(\w+)(?:\(| =|\{|\[|;))", re.MULTILINE)
+MACRO = re.compile(r"^#define (\w+)", re.MULTILINE)
 
 
 def sources(build, names):
     for entry in json.loads((build / "compile_commands.json").read_text()):
         path = pathlib.Path(entry["file"])
-        inside = any((ROOT / part) in path.parents for part in ("apps", "src"))
+        inside = any((ROOT / part) in path.parents for part in ("apps", "src")) and path.suffix == ".cpp"
         wanted = any(name in str(path) for name in names) if names else not path.stem.endswith("_test")
         if inside and wanted:
             yield entry
 
 
-def preprocessed(entry):
+def arguments(entry):
     command = shlex.split(entry["command"])
     if os.path.basename(command[0]) == "ccache":
         command = command[1:]
-    output = command.index("-o")
-    command = command[:output] + command[output + 2:]
+    return command[:command.index("-o")]
+
+
+def types(names):
+    return {name for name in names if name[0].isupper()}
+
+
+def batches(entries):
+    """Groups of entries with the same flags, where no two define the same and none defines a type's name that others use."""
+    groups = []
+    for entry in entries:
+        text = pathlib.Path(entry["file"]).read_text()
+        words = set(WORD.findall(text))
+        own = "".join(OWN.findall(text))
+        defined = {name for found in DEFINED.findall(own) for name in found if name} | set(MACRO.findall(text))
+        for group in groups:
+            if (len(group["entries"]) < MOST_IN_BATCH and group["flags"] == arguments(entry)
+                    and not group["defined"] & defined and not types(group["words"] & defined)
+                    and not types(group["defined"] & words)):
+                break
+        else:
+            group = {"entries": [], "flags": arguments(entry), "words": set(), "defined": set()}
+            groups.append(group)
+        group["entries"].append(entry)
+        group["words"] |= words
+        group["defined"] |= defined
+    return [group["entries"] for group in groups]
+
+
+def tidy(file, entry):
+    # The flags are those of GCC, some of which clang does not know.
+    return subprocess.run([TOOL, "--quiet", file, "--", *arguments(entry)[1:], "-Wno-unknown-warning-option"],
+                          cwd=entry["directory"], capture_output=True, text=True)
+
+
+def check(batch, passed):
+    entry = batch[0]
+    text = "".join(f'#include "{each["file"]}"\n' for each in batch)
     # -C keeps comments, in which NOLINT lives.
-    return subprocess.run(command + ["-E", "-C"], cwd=entry["directory"], capture_output=True, check=True).stdout
-
-
-def check(entry, build, passed):
-    key = hashlib.sha256(preprocessed(entry) + entry["command"].encode() + (ROOT / ".clang-tidy").read_bytes())
-    stamp = passed / key.hexdigest()
+    whole = subprocess.run(arguments(entry) + ["-E", "-C", "-x", "c++", "-"], input=text.encode(),
+                           cwd=entry["directory"], capture_output=True, check=True).stdout
+    key = hashlib.sha256(whole + entry["command"].encode() + (ROOT / ".clang-tidy").read_bytes()).hexdigest()
+    stamp = passed / key
     if stamp.exists():
         return ""
-    # The flags are those of GCC, some of which clang does not know.
-    run = subprocess.run([TOOL, "--quiet", "-p", str(build), "--extra-arg=-Wno-unknown-warning-option", entry["file"]],
-                         capture_output=True, text=True)
+    file = entry["file"]
+    if len(batch) > 1:
+        file = str(passed / f"{key}.cpp")
+        pathlib.Path(file).write_text(text)
+    run = tidy(file, entry)
+    if len(batch) > 1:
+        os.remove(file)
     if run.returncode != 0:
+        if len(batch) > 1:
+            return "".join(check([each], passed) for each in batch)
         return run.stdout or run.stderr
     stamp.touch()
     return ""
@@ -64,10 +114,12 @@ def main():
     passed.mkdir(exist_ok=True)
     start = time.monotonic()
     entries = list(sources(build, sys.argv[2:]))
+    work = [[entry] for entry in entries] if sys.argv[2:] else batches(entries)
+    work.sort(key=len, reverse=True)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        faults = list(filter(None, pool.map(lambda entry: check(entry, build, passed), entries)))
+        faults = list(filter(None, pool.map(lambda batch: check(batch, passed), work)))
     print("\n".join(faults))
-    print(f"{len(entries)} files, {len(faults)} with faults, {time.monotonic() - start:.0f} s")
+    print(f"{len(entries)} files in {len(work)} runs, {len(faults)} with faults, {time.monotonic() - start:.0f} s")
     sys.exit(1 if faults else 0)
 
 

@@ -18,6 +18,9 @@ void describe(ConfigTable& table, FusionConfig& c) {
   table.add("gravity_y", c.gravity_map.y(), "m/s^2", "gravity in the map frame", {-20, 20});
   table.add("gravity_z", c.gravity_map.z(), "m/s^2", "gravity in the map frame", {-20, 20});
   table.add("imu_noise_scale", c.imu_noise_scale, "", "factor on the IMU's noise densities", {0.01, 1000});
+  table.add("imu_scale_sigma", c.imu_scale_sigma, "", "faults of the IMU's scale and alignment, 1 sigma",
+            {0, 0.5});
+  table.add("imu_scale_s", c.imu_scale_s, "s", "how long a motion lasts that they act on", {0, 100});
   table.add("cv_accel_density", c.cv_accel_density, "m/s^2/sqrt(Hz)", "without IMU: white acceleration",
             {1e-6, 1e6});
   table.add("cv_angular_density", c.cv_angular_density, "rad/s^2/sqrt(Hz)",

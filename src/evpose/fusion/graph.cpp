@@ -25,7 +25,7 @@ void Graph::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_
 
 void Graph::predict(const ImuSample& a, const ImuSample& b, bool suspect) {
   motion().step(state_, a, b, suspect);
-  since_.add(a, b, motion().noise(suspect));
+  since_.add(a, b, motion().noise_at(0.5 * (a.gyro + b.gyro), 0.5 * (a.accel + b.accel), suspect));
 }
 
 void Graph::predict(TimeNs t) {

@@ -2,6 +2,7 @@
 #include "evpose/fusion/motion.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "evpose/core/error.h"
 #include "evpose/fusion/back_end.h"
@@ -12,7 +13,11 @@ namespace evpose {
 using namespace error_state;
 
 Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
-    : model_(model), gravity_map_(c.gravity_map), noise_(noise) {
+    : model_(model),
+      gravity_map_(c.gravity_map),
+      noise_(noise),
+      scale_sigma_(c.imu_scale_sigma),
+      scale_s_(c.imu_scale_s) {
   double gyro_sigma = c.start_gyro_bias_sigma_rad_s, accel_sigma = c.start_accel_bias_sigma_m_s2;
   if (model_ == MotionModel::imu) {
     for (double* density :
@@ -37,6 +42,16 @@ Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
   start_sigma_.segment<3>(kV).setConstant(c.start_velocity_sigma_m_s);
   start_sigma_.segment<3>(kBg).setConstant(gyro_sigma);
   start_sigma_.segment<3>(kBa).setConstant(accel_sigma);
+}
+
+ImuNoise Motion::noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, bool suspect) const {
+  ImuNoise out = noise(suspect);
+  if (model_ != MotionModel::imu) return out;
+  // As white noise of the strength that an error which lasts so long has at low frequencies.
+  const double factor = scale_sigma_ * std::sqrt(2 * scale_s_);
+  out.gyro_density = std::hypot(out.gyro_density, factor * rate.norm());
+  out.accel_density = std::hypot(out.accel_density, factor * (force.norm() - gravity_map_.norm()));
+  return out;
 }
 
 FusionState Motion::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const {
@@ -68,7 +83,8 @@ void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vec
     F.block<3, 3>(kP, kBa) = -0.5 * dt * dt * R;
   }
 
-  const Matrix15d P = F * state.covariance * F.transpose() + process_noise(noise(suspect), dt);
+  const Matrix15d P =
+      F * state.covariance * F.transpose() + process_noise(noise_at(rate, force, suspect), dt);
   state.covariance = 0.5 * (P + P.transpose());
   if (transition != nullptr) *transition = F;
 }

@@ -19,6 +19,8 @@ class Motion {
   const Eigen::Vector3d& gravity_map() const { return gravity_map_; }
   /// Densities in use: the IMU's times the configured scale, or those of a suspect step.
   const ImuNoise& noise(bool suspect = false) const { return suspect ? blind_noise_ : noise_; }
+  /// ... and with what faults of scale and alignment add at this motion (body frame, rad/s, m/s^2).
+  ImuNoise noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, bool suspect) const;
 
   /// The state at the start, with its configured uncertainty. The rate is used by constant velocity only.
   FusionState start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const;
@@ -38,6 +40,7 @@ class Motion {
   MotionModel model_;
   Eigen::Vector3d gravity_map_;
   ImuNoise noise_, blind_noise_;
+  double scale_sigma_, scale_s_;
   Vector15d start_sigma_;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,44 +10,50 @@
 #include "evpose/camera/camera.h"
 #include "evpose/core/pose.h"
 #include "evpose/event/event_front.h"
+#include "evpose/registration/contrast_memory.h"
 
 namespace evpose {
 
 class ConfigTable;
 
 struct EventAlignmentConfig {
-  double gate_px = 0.55;           ///< an event belongs to a contour within this distance plus two sigma
-  double widest_gate_px = 6;       ///< bounds the work when the prediction is poor
+  double gate_px = 0.5;  ///< an event belongs to a contour within this distance and two sigma of the map
+  double widest_gate_px = 0.55;    ///< ... opened by two sigma of the prediction, but to no more than this
   double event_sigma_px = 0.7;     ///< scatter of a contour's events about it
   double shared_sigma_px = 0.35;   ///< error that neighbouring events share (clutter, lateness)
   double shared_s = 0.1;           ///< ... and that lasts so long
   double map_sigma_m = 0.5e-3;     ///< of map points that state no sigma
-  double lateness_px = 0.10;       ///< events come so much after the contour
+  bool lateness = true;            ///< events come after the contour
   double lateness_from_px_s = 20;  ///< normal flow below which lateness fades out
-  double strip_px = 4;             ///< half length along the contour that a sample stands for
+  bool polarity = true;            ///< leave out events of the polarity that contrast and flow exclude
+  double sure_steps = 0.3;         ///< ... where the contrast is at least so many thresholds
+  double buffer_sigma = 3;         ///< ... and the normal flow this many sigma from zero
+  double count_px = 1.5;           ///< events so near teach the contrast
+  ContrastConfig contrast;
+  double strip_px = 4;  ///< half length along the contour that a sample stands for
   double ambiguity_px =
-      1.0;              ///< events between two contours, with distances as similar as this, are left out
-  int cluster_px = 32;  ///< cells whose events share an error, at 640 px width
-  double start_caution = 10;     ///< information is divided by 1 + this at the start,
-  double start_caution_s = 0.3;  ///< ... fading with this time constant
+      1.0;                   ///< events between two contours, with distances as similar as this, are left out
+  int cluster_px = 32;       ///< cells whose events share an error, at 640 px width
+  bool honest_slope = true;  ///< take off what the gate hides of an offset
 };
 void describe(ConfigTable& table, EventAlignmentConfig& config);
 
 /// A visible contour sample and its motion over the events' span.
 struct ContourSample {
-  Eigen::Vector2d pixel;       ///< at the time of the update, predicted
-  Eigen::Vector2d normal_px;   ///< unit, across the contour
-  double speed_px_s = 0;       ///< s1: normal . velocity of the contour in the image
-  double curvature_px_s2 = 0;  ///< s2: normal . (u(t - a) - u(t)) = -s1 a + s2 a^2 for age a
-  Vector6d jacobian;           ///< derivative of an event's signed distance by the pose perturbation
-  double map_sigma_px = 0;     ///< the map's error across the contour, in the image
+  Eigen::Vector2d pixel;        ///< at the time of the update, predicted
+  Eigen::Vector2d normal_px;    ///< unit, across the contour
+  double speed_px_s = 0;        ///< s1: normal . velocity of the contour in the image
+  double curvature_px_s2 = 0;   ///< s2: normal . (u(t - a) - u(t)) = -s1 a + s2 a^2 for age a
+  Vector6d jacobian;            ///< derivative of an event's signed distance by the pose perturbation
+  double map_sigma_px = 0;      ///< the map's error across the contour, in the image
+  double speed_sigma_px_s = 0;  ///< error of the speed, 1 sigma
+  std::uint32_t piece = 0;      ///< of the contour, for what is learnt about it
 };
 
 struct EventAlignmentProblem {
   std::span<const FrontEvent> events;  ///< kept since the last update
   std::uint32_t now_us;                ///< time of the update, on the events' clock
   double span_s;                       ///< since the last update
-  double running_s;                    ///< since the start
   std::span<const ContourSample> samples;
   const Matrix6d& pose_covariance;  ///< of the prediction
 };
@@ -56,6 +63,7 @@ struct EventAlignmentResult {
   Vector6d vector = Vector6d::Zero();       ///< information * offset
   int matched_samples = 0;                  ///< with at least one event in the gate
   int matched_events = 0;
+  int wrong_polarity = 0;      ///< events near contours that were left out for their polarity
   double mean_square_px2 = 0;  ///< weighted, of the signed distances
 };
 
@@ -63,13 +71,18 @@ struct EventAlignmentResult {
 /// EV-Pose 4.2 turned round. An event at x of age a has the signed distance
 ///   d = n.(x - u) + s1 a - s2 a^2 + lateness sign(s1)
 /// from the contour sample that claims its pixel; d is zero-mean Gaussian for events of the contour and
-/// uniform over the gate for clutter (soft assignment). The gate follows the predicted covariance and the
-/// map's sigma. Events of a cell and direction share errors that last; their information is capped
-/// accordingly.
+/// uniform over the gate for clutter (soft assignment). The gate is tight: a wide one was measured to hand
+/// the pose to texture beside the contours. It follows the map's sigma. A gate hides part of an offset, as
+/// those events that the offset moves out of it no longer tell of it: the slope of the mean distance is
+/// measured by the density at the gate, so that the information is not over-stated. Events of a cell and
+/// direction share errors that last; their information is capped accordingly.
 class EventAlignment {
  public:
-  EventAlignment(ImageSize size, const EventAlignmentConfig& config);
+  /// `pieces`: of the contours; the samples' numbers are below it.
+  EventAlignment(ImageSize size, const EventAlignmentConfig& config, std::uint32_t pieces = 1);
   EventAlignmentResult align(const EventAlignmentProblem& problem);
+
+  const ContrastMemory& contrast() const { return contrast_; }
 
  private:
   struct Claim {
@@ -77,20 +90,34 @@ class EventAlignment {
     float distance, along, rival;  ///< px; rival: distance of the nearest sample of another contour
   };
   struct Sum {
-    double weight = 0, offset = 0, curvature = 0, square = 0;
+    double weight = 0, offset = 0, square = 0;
     int events = 0;
   };
+  /// How the mean distance answers to an offset: sums over events, slowly forgotten.
+  struct Slope {
+    double weight = 0, inside = 0, at_gate = 0;
+    double value() const;
+  };
+  void gates(const EventAlignmentProblem& problem);
+  void sweep(const EventAlignmentProblem& problem);
+  void sum_events(const EventAlignmentProblem& problem, EventAlignmentResult* result);
+  void weigh_clusters(const EventAlignmentProblem& problem, EventAlignmentResult* result) const;
   void claim_strips(const EventAlignmentProblem& problem);
   void release_strips();
   bool same_line(const ContourSample& a, const ContourSample& b) const;
-  double lateness(double speed_px_s) const;
+  double reach(std::size_t sample) const { return std::max(gate_px_[sample], config_.count_px); }
+  bool polarity_is_wrong(const ContourSample& sample, int sign) const;
+  double lateness(const ContourSample& sample, bool on) const;
 
   ImageSize size_;
   EventAlignmentConfig config_;
   std::vector<Claim> claims_;               ///< one per pixel; sample < 0: none
   std::vector<std::uint32_t> touched_;      ///< pixels claimed, to be released
   std::vector<double> sigma_px_, gate_px_;  ///< per sample
+  std::vector<std::int32_t> claimed_;       ///< pixels, per sample
   std::vector<Sum> sums_;
+  ContrastMemory contrast_;
+  Slope slope_;
 };
 
 }  // namespace evpose

@@ -18,8 +18,9 @@ constexpr double kFocal = 300;  // px per metre of the toy camera: a shift of th
 class EventAlignmentLaws : public ::testing::Test {
  protected:
   EventAlignmentLaws() {
-    config_.lateness_px = 0;
-    config_.start_caution = 0;
+    config_.lateness = false;
+    config_.honest_slope = false;
+    config_.widest_gate_px = 6;
     config_.map_sigma_m = 0;
     covariance_.setZero();
   }
@@ -28,7 +29,7 @@ class EventAlignmentLaws : public ::testing::Test {
   void add_line(const Eigen::Vector2d& at, const Eigen::Vector2d& normal, double speed, int count = 20) {
     const Eigen::Vector2d n = normal.normalized(), t(-n.y(), n.x());
     for (int k = 0; k < count; ++k) {
-      ContourSample s{at + 4.0 * k * t, n, speed, 0, Vector6d::Zero(), 0};
+      ContourSample s{at + 4.0 * k * t, n, speed, 0, Vector6d::Zero()};
       s.jacobian.head<2>() = -kFocal * n;  // dd/dp: the contour moves along +n, the distance shrinks
       samples_.push_back(s);
     }
@@ -57,7 +58,7 @@ class EventAlignmentLaws : public ::testing::Test {
 
   EventAlignmentResult align() {
     EventAlignment alignment({320, 240}, config_);
-    return alignment.align({events_, kNow, kSpan_s, 100.0, samples_, covariance_});
+    return alignment.align({events_, kNow, kSpan_s, samples_, covariance_});
   }
 
   EventAlignmentConfig config_;
@@ -100,7 +101,8 @@ TEST_F(EventAlignmentLaws, AccelerationOfTheContourCounts) {
 }
 
 TEST_F(EventAlignmentLaws, LatenessIsTakenOffInTheDirectionOfMotion) {
-  config_.lateness_px = 0.25;
+  config_.lateness = true;
+  config_.contrast.unknown_lateness_px = config_.contrast.lateness_px = config_.contrast.latest_px = 0.25;
   for (double speed : {400.0, -400.0}) {
     samples_.clear();
     events_.clear();
@@ -172,9 +174,9 @@ TEST_F(EventAlignmentLaws, StripsAreReleasedAfterEachCall) {
   EventAlignment alignment({320, 240}, config_);
   add_line({150, 40}, {1, 0}, 0);
   add_event({150, 60}, 0);
-  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, 100.0, samples_, covariance_}).matched_events, 1);
+  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, samples_, covariance_}).matched_events, 1);
   const std::vector<ContourSample> none;
-  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, 100.0, none, covariance_}).matched_events, 0);
+  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, none, covariance_}).matched_events, 0);
 }
 
 }  // namespace

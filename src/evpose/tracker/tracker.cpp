@@ -103,7 +103,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       given_q_body_cam_(setup.T_body_cam.q),
       start_t_(start.t),
       last_update_(start.t),
-      alignment_(setup_.camera->size(), config.alignment) {
+      pieces_(cut_contours(*setup_.map)),
+      alignment_(setup_.camera->size(), config.alignment, pieces_.count) {
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
   next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
@@ -233,6 +234,10 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
   const Camera& camera = *setup_.camera;
   const ContourMap& map = *setup_.map;
   const double h = 0.5 * span_s;
+  const Eigen::Matrix3d velocity_covariance =
+      fusion_->state().covariance.block<3, 3>(error_state::kV, error_state::kV);
+  const double rate_variance =
+      fusion_->state().covariance.block<3, 3>(error_state::kBg, error_state::kBg).trace() / 3;
   points_.clear();
   samples_.clear();
   std::vector<double> flows, depths;
@@ -251,7 +256,7 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
     const double d1 = normal.dot(*half_ago - *pixel), d2 = normal.dot(*ago - *pixel);
     const double speed = (d2 - 4 * d1) / (2 * h);
     if (config_.field == FieldKind::events) {
-      ContourSample s{*pixel, normal, speed, (d2 - 2 * d1) / (2 * h * h), {}, 0};
+      ContourSample s{*pixel, normal, speed, (d2 - 2 * d1) / (2 * h * h), {}};
       const Eigen::RowVector3d across = normal.transpose() * J;
       const Eigen::RowVector3d A = across * R_cam_body;
       const Eigen::Vector3d x_body = T_body_cam * x_cam;
@@ -259,6 +264,10 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
       s.jacobian.tail<3>() = -(A * so3::hat(x_body)).transpose();
       const double sigma_m = map.points[i].sigma > 0 ? map.points[i].sigma : config_.alignment.map_sigma_m;
       s.map_sigma_px = sigma_m * across.norm();
+      s.speed_sigma_px_s =
+          std::sqrt(std::max(0.0, s.jacobian.head<3>().dot(velocity_covariance * s.jacobian.head<3>()) +
+                                      rate_variance * s.jacobian.tail<3>().squaredNorm()));
+      s.piece = pieces_.of_point[i];
       samples_.push_back(s);
     } else {
       const RegistrationConfig& c = config_.exponential;
@@ -276,8 +285,8 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
   const Matrix6d covariance = fusion_->measured_covariance();
   if (config_.field == FieldKind::events) {
-    const EventAlignmentResult r = alignment_.align(
-        {front_.kept(), front_.stamp(t), span_s, to_seconds(t - start_t_), samples_, covariance});
+    const EventAlignmentResult r =
+        alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_, covariance});
     return {{r.information, r.vector},
             static_cast<int>(samples_.size()),
             r.matched_samples,

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/contrast_memory.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace evpose {
+namespace {
+
+void show(ContrastMemory& memory, double steps, double area_px2) {
+  for (int k = 0; k < static_cast<int>(area_px2 / 10); ++k) {
+    memory.sweep(0, 10);
+    for (int i = 0; i < static_cast<int>(std::lround(std::abs(steps) * 10)); ++i)
+      memory.count(0, steps > 0 ? 1 : -1);
+  }
+}
+
+TEST(ContrastMemory, LearnsSizeAndSignOfAStep) {
+  for (double steps : {-4.0, -1.0, 0.5, 3.0}) {
+    ContrastMemory memory(1, {});
+    EXPECT_FALSE(memory.known(0));
+    show(memory, steps, 2000);
+    EXPECT_TRUE(memory.known(0));
+    EXPECT_NEAR(memory.steps(0), steps, 0.1 * std::abs(steps)) << steps;
+  }
+}
+
+TEST(ContrastMemory, ForgetsWhatNoLongerHolds) {
+  ContrastMemory memory(1, {});
+  show(memory, 3, 2000);
+  show(memory, -3, 2000);  // a free rim against another background
+  EXPECT_LT(memory.steps(0), -2);
+}
+
+TEST(ContrastMemory, TextureOfBothSignsCancels) {
+  ContrastMemory memory(1, {});
+  for (int i = 0; i < 500; ++i) {
+    memory.sweep(0, 1);
+    memory.count(0, i % 2 ? 1 : -1);
+  }
+  EXPECT_LT(std::abs(memory.steps(0)), 0.02);
+}
+
+TEST(ContrastMemory, LatenessFallsWithContrast) {
+  double before = 1;
+  for (double steps : {0.2, 0.5, 1.0, 3.0}) {
+    ContrastMemory memory(1, {});
+    show(memory, steps, 500);
+    const double mean = 0.5 * (memory.lateness_px(0, true) + memory.lateness_px(0, false));
+    EXPECT_LE(mean, before);
+    before = mean;
+  }
+}
+
+TEST(ContrastMemory, EventsLieTowardsTheDarkSide) {
+  // A pixel half of whose logarithm is reached: bright share b of a step of ratio r, (1 - b) / r + b =
+  // r^-1/2.
+  ContrastConfig config;
+  config.lateness_px = config.threshold_px = config.unknown_lateness_px = 0;
+  ContrastMemory memory(1, config);
+  show(memory, 4, 590);
+  const double r = std::exp(memory.steps(0) * config.threshold);
+  const double bright = (std::sqrt(1 / r) - 1 / r) / (1 - 1 / r);
+  EXPECT_NEAR(memory.lateness_px(0, false), 0.5 - bright, 1e-6);
+  EXPECT_NEAR(memory.lateness_px(0, true), bright - 0.5, 1e-6);
+}
+
+}  // namespace
+}  // namespace evpose

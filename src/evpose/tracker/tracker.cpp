@@ -287,10 +287,9 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
   if (config_.field == FieldKind::events) {
     const EventAlignmentResult r =
         alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_, covariance});
-    return {{r.information, r.vector},
-            static_cast<int>(samples_.size()),
-            r.matched_samples,
-            std::sqrt(r.mean_square_px2)};
+    return {{r.information, r.vector}, static_cast<int>(samples_.size()),
+            r.matched_samples,         std::sqrt(r.mean_square_px2),
+            r.matched_events,          r.wrong_polarity};
   }
   const Matrix6d prior = covariance.ldlt().solve(Matrix6d::Identity());
   const AlignmentProblem problem{
@@ -361,6 +360,8 @@ Update Tracker::update(TimeNs t) {
   out.points = stpe.points;
   out.points_matched = stpe.matched;
   out.residual = stpe.residual;
+  out.events_matched = stpe.events;
+  out.wrong_polarity = stpe.wrong_polarity;
   out.times = {events_time_s_, t1 - t0, t2 - t1, t3 - t2, now() - t3};
   counted_ = front_.counts();
   events_time_s_ = 0;

@@ -41,6 +41,8 @@ struct Update {
   std::int32_t events_kept = 0;     ///< of these, passed by the noise filter
   std::int32_t points = 0;          ///< chosen map points
   std::int32_t points_matched = 0;  ///< of these, with events near by
+  std::int32_t events_matched = 0;  ///< events in the gate (field: events)
+  std::int32_t wrong_polarity = 0;  ///< events in the gate left out for their polarity
   double residual = 0;              ///< RMS of event distances, px (events); of the loss, 0..1 (exponential)
   double innovation = 0;            ///< normalised innovation squared / 6
   StageTimes times;

@@ -54,7 +54,7 @@ struct FusionConfig {
   Eigen::Vector3d gravity_map{0, 0, -9.81};  ///< m/s^2
   double imu_noise_scale =
       1.5;  ///< on the densities of imu.yaml: calibrations are made at rest, drones vibrate
-  double imu_scale_sigma = 3e-3;    ///< faults of the IMU's scale and alignment
+  double imu_scale_sigma = 5e-3;    ///< faults of the IMU's scale and alignment
   double imu_scale_s = 0.3;         ///< ... and how long one and the same motion lasts
   double cv_accel_density = 1.5;    ///< constant velocity: white acceleration, m/s^2/sqrt(Hz); about 6 m/s^2
                                     ///< that keep up for 50 ms. More only opens the gate to clutter.

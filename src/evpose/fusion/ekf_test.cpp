@@ -32,6 +32,7 @@ TEST(Ekf, CovarianceGrowsAsDifferencesOfTheStrapdownSay) {
   // With all noise off, P after one long step is F P F^T: check F column by column against perturbed runs.
   FusionConfig config;
   config.imu_noise_scale = 1e-2;
+  config.imu_scale_sigma = 0;
   const ImuNoise silent{0, 0, 0, 0, 1000};
   const ImuSample a = sample(0), b = sample(5 * kNsPerMs);
   const auto perturbed_run = [&](int i, double h) {
@@ -66,6 +67,7 @@ TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
   noise.accel_walk = noise.gyro_walk = 0;
   FusionConfig config;
   config.imu_noise_scale = 1;
+  config.imu_scale_sigma = 0;
   Ekf ekf(Motion(MotionModel::imu, config, noise));
   ekf.start(0, some_state(), {0, 0, 0});
   const int steps = 200, runs = 1500;

@@ -279,6 +279,7 @@ Flown fly(BackEndKind kind, MotionModel model, unsigned seed) {
   FusionConfig config;
   config.kind = kind;
   config.imu_noise_scale = 1;
+  config.imu_scale_sigma = 0;
   const ImuNoise noise;
   const auto back_end = make_back_end(model, config, noise, Pose{});
   std::mt19937 random(seed);

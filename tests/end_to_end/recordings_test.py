@@ -46,7 +46,7 @@ class RecordingsTest(unittest.TestCase):
     def test_every_peer_recording_is_tracked_to_its_end(self):
         for recording in MAPS:
             with self.subTest(recording=recording):
-                self.check(track(self.out / recording, recording, *occluders(recording)), 5, 0.1)
+                self.check(track(self.out / recording, recording, *occluders(recording)), 3, 0.06)
 
     def test_contours_alone_are_enough(self):
         for recording in ("room_spiral", "courtyard_landing"):

@@ -44,7 +44,8 @@ def acceleration(t_s):
 def wall_contours():
     """x y z nx ny nz of points each centimetre along a grid of lines on the wall."""
     along, rows = np.arange(-1.5, 1.5, 0.01), []
-    for offset in np.arange(-1.4, 1.5, 0.4):
+    for k in range(8):  # not at equal distances: their events would all come at once
+        offset = -1.4 + 0.36 * k + 0.0057 * k * k
         upright = np.stack([np.full_like(along, WALL_M), np.full_like(along, offset), along + 1], axis=1)
         level = np.stack([np.full_like(along, WALL_M), along, np.full_like(along, offset + 1)], axis=1)
         rows.append(np.hstack([upright, np.tile([0.0, 1.0, 0.0], (len(along), 1))]))
@@ -58,23 +59,32 @@ class Recording:
         self.calibration = CALIBRATION
         self.imu_model = IMU_MODEL
         self.imu_t_ns = np.arange(0, int(duration_s * 1e9) + 1, 2_000_000)
+        noise = np.random.default_rng(1).normal(size=(len(self.imu_t_ns), 6))  # no real axis stands still
         self.imu = np.hstack([np.zeros((len(self.imu_t_ns), 3)),
                               acceleration(self.imu_t_ns * 1e-9) + [0, 0, 9.81]])
+        self.imu += noise * np.sqrt(500) * np.repeat([0.0004, 0.002], 3)
         self.groundtruth_t_s = np.arange(0, duration_s + 1e-9, 0.01)
         self.t, self.x, self.y, self.p = self._events(duration_s)
 
     def _events(self, duration_s):
-        """An event where a contour point enters a pixel: enough for a program that reads, chooses and refuses."""
+        """An event where a contour passes the middle of a pixel: upright lines that of a column, level ones that of a
+        row. Enough for a program that reads, chooses and refuses."""
+        upright = self.contours[:, 4] > 0.5  # their normal lies along the wall
         columns, previous = [], None
         for t_us in range(0, int(duration_s * 1e6), 500):
             in_body = self.contours[:, :3] - position(t_us * 1e-6)
-            x = np.rint((WIDTH - 1) / 2 - FOCAL * in_body[:, 1] / in_body[:, 0]).astype(int)
-            y = np.rint((HEIGHT - 1) / 2 - FOCAL * in_body[:, 2] / in_body[:, 0]).astype(int)
-            pixel = np.where((x >= 0) & (x < WIDTH) & (y >= 0) & (y < HEIGHT), y * WIDTH + x, -1)
+            pixel = np.stack([(WIDTH - 1) / 2 - FOCAL * in_body[:, 1] / in_body[:, 0],
+                              (HEIGHT - 1) / 2 - FOCAL * in_body[:, 2] / in_body[:, 0]])
+            across = np.where(upright, pixel[0], pixel[1])
             if previous is not None:
-                new = np.unique(pixel[(pixel != previous) & (pixel >= 0)])
+                middle = np.maximum(np.floor(across), np.floor(previous)).astype(int)
+                x = np.where(upright, middle, np.rint(pixel[0])).astype(int)
+                y = np.where(upright, np.rint(pixel[1]), middle).astype(int)
+                passed = ((np.floor(across) != np.floor(previous)) & (x >= 0) & (x < WIDTH) & (y >= 0)
+                          & (y < HEIGHT))
+                new = np.unique(y[passed] * WIDTH + x[passed])
                 columns.append(np.stack([np.full_like(new, t_us), new % WIDTH, new // WIDTH, (new // 7) % 2]))
-            previous = pixel
+            previous = across
         return np.hstack(columns)
 
     def write(self, folder, t_type="i8"):

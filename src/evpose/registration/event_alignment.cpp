@@ -14,6 +14,7 @@ constexpr double kEdgePrior = 0.5;  // an event in the gate is of the contour ra
 constexpr double kGateRim = 0.8;    // events beyond this share of the gate tell the density at it
 constexpr double kSlope_s = 0.05;   // memory of the slope
 constexpr double kLeastSlope = 0.15;
+constexpr double kTelling = 50;  // events' weight from which on the slope is believed
 
 }  // namespace
 
@@ -22,6 +23,9 @@ void describe(ConfigTable& table, EventAlignmentConfig& c) {
             "events within this, joined with two sigma of the map, belong to a contour", {0.1, 50});
   table.add("widest_gate_px", c.widest_gate_px, "px",
             "an unsure prediction opens the gate by two sigma, but no further than to this", {0.1, 50});
+  table.add("capture_gate_px", c.capture_gate_px, "px",
+            "... and to this while the events in it show no contour", {0.1, 50});
+  table.add("capture_below", c.capture_below, "", "... that is, while their slope is less than this", {0, 1});
   table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
   table.add("shared_sigma_px", c.shared_sigma_px, "px", "error that neighbouring events share", {0, 10});
   table.add("shared_s", c.shared_s, "s", "how long a shared error lasts", {0, 100});
@@ -58,6 +62,11 @@ double EventAlignment::lateness(const ContourSample& s, bool on) const {
   if (!config_.lateness) return 0;
   const double fade = std::min(1.0, std::abs(s.speed_px_s) / std::max(config_.lateness_from_px_s, 1e-9));
   return std::copysign(fade, s.speed_px_s) * contrast_.lateness_px(s.piece, on);
+}
+
+/// Events spread evenly over the gate do not tell of contours: the pose is not where it is thought to be.
+bool EventAlignment::captured() const {
+  return slope_.weight < kTelling || slope_.value() >= config_.capture_below;
 }
 
 bool EventAlignment::polarity_is_wrong(const ContourSample& s, int sign) const {
@@ -116,12 +125,15 @@ void EventAlignment::release_strips() {
 void EventAlignment::gates(const EventAlignmentProblem& p) {
   sigma_px_.resize(p.samples.size());
   gate_px_.resize(p.samples.size());
+  // Events spread evenly over the gate do not tell of contours: the pose is not where it is thought to be.
+  const bool captured = slope_.weight < kTelling || slope_.value() >= config_.capture_below;
+  const double widest =
+      std::max(config_.gate_px, captured ? config_.widest_gate_px : config_.capture_gate_px);
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
     const ContourSample& s = p.samples[i];
     const double pose_variance = std::max(0.0, s.jacobian.dot(p.pose_covariance * s.jacobian));
     sigma_px_[i] = std::sqrt(pose_variance + s.map_sigma_px * s.map_sigma_px);
-    const double own = std::min(config_.gate_px + 2 * std::sqrt(pose_variance),
-                                std::max(config_.gate_px, config_.widest_gate_px));
+    const double own = std::min(config_.gate_px + 2 * std::sqrt(pose_variance), widest);
     gate_px_[i] = std::hypot(own, 2 * s.map_sigma_px);
   }
 }
@@ -233,6 +245,7 @@ EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
   sum_events(p, &result);
   release_strips();
   weigh_clusters(p, &result);
+  result.captured = captured();
   return result;
 }
 

@@ -19,6 +19,8 @@ class ConfigTable;
 struct EventAlignmentConfig {
   double gate_px = 0.5;  ///< an event belongs to a contour within this distance and two sigma of the map
   double widest_gate_px = 0.55;    ///< ... opened by two sigma of the prediction, but to no more than this
+  double capture_gate_px = 6;      ///< ... and to no more than this while the events in it show no contour
+  double capture_below = 0.3;      ///< ... that is, while their slope is less than this
   double event_sigma_px = 0.7;     ///< scatter of a contour's events about it
   double shared_sigma_px = 0.35;   ///< error that neighbouring events share (clutter, lateness)
   double shared_s = 0.05;          ///< ... and that lasts so long
@@ -63,6 +65,7 @@ struct EventAlignmentResult {
   Vector6d vector = Vector6d::Zero();       ///< information * offset
   int matched_samples = 0;                  ///< with at least one event in the gate
   int matched_events = 0;
+  bool captured = true;        ///< the events in the gate gather at the contours
   int wrong_polarity = 0;      ///< events near contours that were left out for their polarity
   double mean_square_px2 = 0;  ///< weighted, of the signed distances
 };
@@ -106,6 +109,7 @@ class EventAlignment {
   void release_strips();
   bool same_line(const ContourSample& a, const ContourSample& b) const;
   double reach(std::size_t sample) const { return std::max(gate_px_[sample], config_.count_px); }
+  bool captured() const;
   bool polarity_is_wrong(const ContourSample& sample, int sign) const;
   double lateness(const ContourSample& sample, bool on) const;
 

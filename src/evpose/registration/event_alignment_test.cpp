@@ -128,6 +128,41 @@ TEST_F(EventAlignmentLaws, GateNeverOpensBeyondItsBound) {
   EXPECT_EQ(align().matched_events, 1);
 }
 
+TEST_F(EventAlignmentLaws, EventsSpreadEvenlyDoNotCountAsCaptured) {
+  config_.honest_slope = true;
+  add_line({150, 20}, {1, 0.3}, 0, 50);
+  std::mt19937 random(4);
+  for (int i = 0; i < 100'000; ++i)
+    add_event({80.0 + static_cast<double>(random() % 81), 20.0 + static_cast<double>(random() % 200)}, 0);
+  EXPECT_FALSE(align().captured);
+}
+
+TEST_F(EventAlignmentLaws, SlopeOfEventsOnTheContourIsThatOfNoGate) {
+  config_.honest_slope = true;
+  add_line({150, 20}, {1, 0}, 0, 50);
+  for (int i = 0; i < 2000; ++i) add_event({150, 20.0 + i % 190}, 0);
+  const EventAlignmentResult honest = align();
+  EXPECT_TRUE(honest.captured);
+  config_.honest_slope = false;
+  EXPECT_NEAR(honest.information(0, 0) / align().information(0, 0), 1, 1e-9);
+}
+
+TEST_F(EventAlignmentLaws, WrongPolaritiesAreLeftOutOnceContrastIsKnown) {
+  EventAlignment alignment({320, 240}, config_);
+  add_line({150, 20}, {1, 0}, 500, 50);
+  for (auto& s : samples_) s.speed_sigma_px_s = 10;
+  for (unsigned seed : {1, 2, 3}) draw_events(0, seed);
+  for (auto& e : events_) e.on = 1;  // getting brighter as it comes: dark in front
+  for (int k = 0; k < 4; ++k)
+    EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
+  for (auto& e : events_) e.on = 0;
+  const EventAlignmentResult wrong = alignment.align({events_, kNow, kSpan_s, samples_, covariance_});
+  EXPECT_GT(wrong.wrong_polarity, 100);
+  // In the buffer zone both polarities count.
+  for (auto& s : samples_) s.speed_sigma_px_s = 1000;
+  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
+}
+
 TEST_F(EventAlignmentLaws, EventsBetweenTwoContoursAreLeftOut) {
   config_.gate_px = 2;
   add_line({150, 40}, {1, 0}, 0);

@@ -39,9 +39,9 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
   } else if (silent_s > config_.degraded_after_s) {
     next = Health::degraded;
     why = text("no registration for ", config_.degraded_after_s, " s: ", e.refused);
-  } else if (!e.imu_fault.empty()) {
+  } else if (!e.fault.empty()) {
     next = Health::degraded;
-    why = e.imu_fault;
+    why = e.fault;
   } else if (e.sigma_px > config_.degraded_sigma_px) {
     next = Health::degraded;
     why = text("pose uncertain by ", e.sigma_px, " px in the weakest direction");

@@ -27,7 +27,7 @@ struct Evidence {
   bool accepted = false;
   std::string refused;  ///< why not accepted
   double sigma_px = 0;  ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
-  std::string imu_fault;  ///< what is wrong with the IMU's data, if anything
+  std::string fault;    ///< what is wrong with the data, if anything
 };
 
 /// The state machine of design.md 5.9: waiting, initialising, tracking, degraded, lost; each with a reason.

@@ -331,7 +331,8 @@ Update Tracker::update(TimeNs t) {
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
   evidence.refused = refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
-  evidence.imu_fault = blind ? "no IMU samples" : imu_watch_.fault(t);
+  evidence.fault = blind ? "no IMU samples" : imu_watch_.fault(t);
+  if (evidence.fault.empty() && !stpe.captured) evidence.fault = "events do not gather at the contours";
   if (evidence.accepted) fusion_->update(stpe.measurement);  // eq. (5) for the newest state
   setup_.T_body_cam.q = fusion_->calibration().turn * given_q_body_cam_;
 

@@ -115,6 +115,7 @@ class Tracker {
     int points = 0, matched = 0;
     double residual = 0;
     int events = 0, wrong_polarity = 0;
+    bool captured = true;
   };
   /// Fills points_ or samples_ from the visible set; the median image motion, px/s.
   double plan_points(const Pose& T_map_body, double span_s);

@@ -4,7 +4,8 @@
 
 Only files whose path contains one of the NAMEs, each by itself; without any, all of apps and src but the unit tests,
 in batches: most of the time goes into the headers of libraries, which the files of a batch share. Files stand together
-only where the names that they define for themselves allow it, and a batch with faults is looked at again file by file.
+only where the names that they define for themselves allow it, and of a batch with faults the files that these name are
+looked at again one by one.
 What passed is not looked at again until it, what it includes, its flags or .clang-tidy change.
 """
 import concurrent.futures
@@ -95,9 +96,11 @@ def check(batch, passed):
     run = tidy(file, entry)
     if len(batch) > 1:
         os.remove(file)
+    if run.returncode != 0 and len(batch) > 1:
+        named = [each for each in batch if each["file"] in run.stdout] or batch
+        rest = [each for each in batch if each not in named]
+        return "".join(check(part, passed) for part in [[each] for each in named] + ([rest] if rest else []))
     if run.returncode != 0:
-        if len(batch) > 1:
-            return "".join(check([each], passed) for each in batch)
         return run.stdout or run.stderr
     stamp.touch()
     return ""

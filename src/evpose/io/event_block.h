@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "evpose/camera/camera.h"
 #include "evpose/event/event.h"
 
 namespace evpose {
@@ -13,18 +14,21 @@ namespace evpose {
 /// Events in a block are at most this many, so that it stays in the cache between decoder and packer.
 inline constexpr std::size_t kBlockEvents = 16384;
 
-/// Events as a decoder gives them, nothing checked: the first `count` of `events`, each with the stamp
+/// Events as a decoder gives them: the first `count` of `events`, each with the stamp
 /// base_us + dt_us in whole microseconds.
 struct EventBlock {
   std::int64_t base_us = 0;
   std::vector<Event> events;  ///< room; it is kept from block to block
   std::size_t count = 0;
   std::int64_t first_row = 0;  ///< number of the first event in the file, from 0
+  /// The decoder stands for order and for pixels inside this size; 0x0, as after start(): nothing is checked.
+  ImageSize sound_within;
 
   /// An empty block with room for kBlockEvents, whose first event is the one after the last block's.
   void start() {
     first_row += static_cast<std::int64_t>(count);
     count = 0;
+    sound_within = {};
     if (events.size() < kBlockEvents) events.resize(kBlockEvents);
   }
   std::int64_t time_us(std::size_t i) const { return base_us + events[i].dt_us; }

@@ -110,6 +110,8 @@ std::size_t EventPacker::sound() const {
     return 0;
   // The first has no left neighbour to compare with; its time was held against the last block.
   if (events[0].x >= widest_ || events[0].y >= highest_) return 0;
+  const ImageSize vouched = block_.sound_within;
+  if (vouched != ImageSize{} && vouched.width <= widest_ && vouched.height <= highest_) return n;
   for (std::size_t begin = 1; begin < n; begin += kStride) {
     const std::size_t end = std::min(begin + kStride, n);
     if (collect_faults(events, begin, end, widest_, highest_) >= 0) continue;

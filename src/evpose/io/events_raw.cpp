@@ -19,6 +19,8 @@ namespace {
 /// Bytes decoded in one go.
 constexpr std::size_t kPiece = 64 << 10;
 constexpr int kMostHeaderLines = 1000;
+/// No word holds a pixel outside of this.
+constexpr ImageSize kLargest = {65536, 32768};
 /// Words looked at to find the order of their halves.
 constexpr std::size_t kProbeBytes = 8000;
 
@@ -153,6 +155,7 @@ class RawSource : public EventSource {
     if (bytes.empty()) return false;
     const std::size_t used =
         std::visit([&](auto& decoder) { return decoder.decode(bytes, block, triggers); }, decoder_);
+    block.sound_within = header_.size == ImageSize{} ? kLargest : header_.size;
     bytes_.skip(used);
     return used > 0;
   }

@@ -2,7 +2,6 @@
 #include "evpose/io/evt2.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
 
@@ -29,6 +28,15 @@ constexpr std::size_t kBetweenGroups = 8;
 /// What a block may span, short of what Event holds.
 constexpr std::int64_t kBlockSpanUs = std::int64_t{1} << 31;
 constexpr std::size_t kWidestVector = 32;
+/// The most that the low part of the time can be.
+constexpr std::uint32_t kLowUs = 63;
+
+/// What the registers of current processors hold; others take it in parts.
+constexpr std::size_t kGroup = 8;
+using Words = std::uint32_t __attribute__((vector_size(4 * kGroup)));
+using Signed = std::int32_t __attribute__((vector_size(4 * kGroup)));
+using Pairs = std::uint64_t __attribute__((vector_size(4 * kGroup)));
+using Events = std::uint64_t __attribute__((vector_size(8 * kGroup)));
 
 template <class Word>
 Word load_word(const std::byte* bytes, std::size_t word) {
@@ -69,37 +77,33 @@ void Evt2Clock::set(std::uint32_t high, DecodeFaults& faults) {
 Evt2Decoder::Evt2Decoder(ImageSize size)
     : width_(side(size.width, 1 << 16)), height_(side(size.height, 1 << 15)) {}
 
-/// Groups of events that are all sound and in order, as most are: short loops of fixed length, which
-/// compilers turn into vector instructions. Returns the number of words taken.
+/// Groups of events that are all sound and in order, as most are, eight in a register. Returns the number of
+/// words taken.
 std::size_t Evt2Decoder::groups(const std::byte* bytes, std::size_t words, EventBlock& block) {
-  constexpr std::size_t kGroup = 8;
+  const std::int64_t behind_us = std::max<std::int64_t>(last_us_ - clock_.high_us(), 0);
+  if (behind_us > kLowUs) return 0;
   const auto high_dt = static_cast<std::uint32_t>(clock_.high_us() - block.base_us);
-  const auto width = static_cast<std::int32_t>(width_), height = static_cast<std::int32_t>(height_);
-  // The first must not be behind the last event; 64 stands for any time that is beyond all of the group.
-  const bool is_behind = last_us_ > clock_.high_us();
-  auto low =
-      static_cast<std::int32_t>(is_behind ? std::min<std::int64_t>(last_us_ - clock_.high_us(), 64) : 0);
+  const auto last_column = static_cast<std::int32_t>(width_) - 1;
+  const auto last_row = static_cast<std::int32_t>(height_) - 1;
   std::size_t i = 0;
+  // Each time is held against the one at its left: that of the first word against the last event's.
+  Words left = Words{} + (static_cast<std::uint32_t>(behind_us) << 22);
   for (; i + kGroup <= words && block.count + kGroup <= block.events.size(); i += kGroup) {
-    std::array<std::uint32_t, kGroup> word;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
-    std::memcpy(word.data(), bytes + 4 * i, sizeof(word));
-    std::array<std::int32_t, kGroup + 1> t;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
-    t[0] = low;
-    for (std::size_t k = 0; k < kGroup; ++k) t[k + 1] = static_cast<std::int32_t>(word[k] >> 22 & 0x3F);
-    std::int32_t faults = 0;  // its sign bit collects what is wrong
-    for (std::size_t k = 0; k < kGroup; ++k) {
-      const auto x = static_cast<std::int32_t>(word[k] >> 11 & 0x7FF),
-                 y = static_cast<std::int32_t>(word[k] & 0x7FF);
-      const auto other_kind = static_cast<std::int32_t>(word[k] >> 29 != 0 ? 0x80000000u : 0u);
-      faults |= (t[k + 1] - t[k]) | (width - 1 - x) | (height - 1 - y) | other_kind;
-    }
-    if (faults < 0) break;
-    Event* const out = block.events.data() + block.count;
-    for (std::size_t k = 0; k < kGroup; ++k)
-      out[k] = event_of_bits(event_bits(high_dt + static_cast<std::uint32_t>(t[k + 1]), word[k] >> 11 & 0x7FF,
-                                        word[k] & 0x7FF, word[k] >> 28));
+    Words word;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
+    std::memcpy(&word, bytes + 4 * i, sizeof(word));
+    if (i > 0)
+      std::memcpy(&left, bytes + 4 * i - 4, sizeof(left));
+    else
+      std::memcpy(reinterpret_cast<std::byte*>(&left) + 4, bytes, sizeof(left) - 4);
+    const Words low = word >> 22 & kLowUs, x = word >> 11 & 0x7FF, y = word & 0x7FF;
+    const Signed faults = (Signed(low) < Signed(left >> 22 & kLowUs)) | (Signed(x) > last_column) |
+                          (Signed(y) > last_row) | Signed(word >> 29);
+    const auto any = Pairs(faults);
+    if ((any[0] | any[1] | any[2] | any[3]) != 0) break;
+    const Events events = __builtin_convertvector(low + high_dt, Events) |
+                          __builtin_convertvector(x | y << 16 | word >> 28 << 31, Events) << 32;
+    std::memcpy(block.events.data() + block.count, &events, sizeof(events));
     block.count += kGroup;
-    low = t[kGroup];
   }
   if (i > 0) last_us_ = block.time_us(block.count - 1);
   return i;

@@ -2,6 +2,7 @@
 #include "evpose/io/evt3.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 
@@ -27,6 +28,33 @@ constexpr unsigned kHighs = 4096;
 /// Steps back, in units of the high part, that cameras are known to make without having lost the time.
 constexpr unsigned kHiccup = 10;
 constexpr std::size_t kWidestVector = 12;
+/// None of these bits is set in words of the kinds kAddressY and kAddressX.
+constexpr unsigned kRowOrEvent = 0xD000;
+
+/// Four events in one register, where the processor has such wide ones.
+using Four = std::uint64_t __attribute__((vector_size(32)));
+
+/// Four neighbouring pixels by the pattern of those that are there: what each adds to the event at the first.
+/// Those behind the last are room that the next ones overwrite.
+constexpr std::array<Four, 16> make_quads() {
+  std::array<Four, 16> all{};
+  for (unsigned mask = 0; mask < 16; ++mask) {
+    std::array<std::uint64_t, 4> add{};
+    std::size_t n = 0;
+    for (unsigned k = 0; k < 4; ++k)
+      if ((mask >> k & 1) != 0) add[n++] = std::uint64_t{k} << 32;
+    all[mask] = Four{add[0], add[1], add[2], add[3]};
+  }
+  return all;
+}
+constexpr std::array<Four, 16> kQuads = make_quads();
+
+/// Writes the pixels of `mask`, of four bits; returns where the next goes. Room for four is needed.
+Event* write_quad(std::uint64_t first, unsigned mask, Event* out) {
+  const Four events = kQuads[mask] + first;
+  std::memcpy(out, &events, sizeof(events));
+  return out + std::popcount(mask);
+}
 
 unsigned load(const std::byte* bytes, std::size_t word) {
   std::uint16_t value = 0;
@@ -102,9 +130,6 @@ bool Evt3Decoder::has_room(const EventBlock& block) const {
 /// data, which is what makes it fast. Stops at any other word, at an event outside, and where the block is
 /// full.
 std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventBlock& block) {
-  constexpr unsigned kVectors = 1u << kVector12 | 1u << kVector8;
-  constexpr unsigned kPlain =
-      1u << kAddressY | 1u << kAddressX | 1u << kTimeLow | 1u << kVectorBase | kVectors;
   const unsigned same_high = kTimeHigh << 12 | high_, width = width_, height = height_;
   const std::int64_t high_dt = high_us_ - block.base_us;
   std::int64_t dt = now_us_ - block.base_us;
@@ -114,29 +139,33 @@ std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventB
   Event* out = begin;
   std::size_t i = 0;
   for (; i < words && out <= full; ++i) {
-    const unsigned word = load(bytes, i), kind = word >> 12, x = word & 0x7FF;
-    if ((kPlain >> kind & 1) == 0 && word != same_high) break;
-    if ((kVectors >> kind & 1) != 0) {
-      unsigned mask = kind == kVector12 ? word & 0xFFF : word & 0xFF;
-      if (base_x + std::bit_width(mask) > width || y >= height) break;
+    const unsigned word = load(bytes, i), kind = word >> 12, value = word & 0x7FF;
+    if ((word & kRowOrEvent) == 0) {  // most of the words, in an order that cannot be foreseen
+      const unsigned is_event = kind >> 1, is_row = is_event - 1;  // the latter as a mask
+      const unsigned outside = static_cast<unsigned>(value >= width) | static_cast<unsigned>(y >= height);
+      if ((is_event & outside) != 0) break;
+      const std::uint64_t place = (word & 0x7FFu) | (word & 0x800u) << 20;
+      *out = event_of_bits(event_bits(static_cast<std::uint32_t>(dt), 0, y, 0) + (place << 32));
+      out += is_event;
+      y = (y & ~is_row) | (value & is_row);
+    } else if (kind == kVectorBase) {
+      base_x = value;
+      base_on = word >> 11 & 1;
+    } else if (kind == kVector12 || kind == kVector8) {
+      const unsigned mask = word & (kind == kVector12 ? 0xFFFu : 0xFFu);
+      if (base_x + static_cast<unsigned>(std::bit_width(mask)) > width || y >= height) break;
       const std::uint64_t first = event_bits(static_cast<std::uint32_t>(dt), base_x, y, base_on);
-      for (; mask != 0; mask &= mask - 1)
-        *out++ = event_of_bits(first + (static_cast<std::uint64_t>(std::countr_zero(mask)) << 32));
+      out = write_quad(first, mask & 0xF, out);
+      out = write_quad(first + (std::uint64_t{4} << 32), mask >> 4 & 0xF, out);
+      out = write_quad(first + (std::uint64_t{8} << 32), mask >> 8, out);
       base_x = (base_x + (kind == kVector12 ? 12 : 8)) & 0xFFFF;
-      continue;
+    } else if (kind == kTimeLow) {
+      const std::int64_t told = high_dt + (word & 0xFFF);
+      if (told < dt) break;
+      dt = told;
+    } else if (word != same_high) {
+      break;
     }
-    const std::int64_t told = high_dt + (word & 0xFFF);
-    if (static_cast<bool>(static_cast<unsigned>(kind == kTimeLow) & static_cast<unsigned>(told < dt))) break;
-    const bool is_event = kind == kAddressX;
-    const bool outside =
-        static_cast<bool>(static_cast<unsigned>(x >= width) | static_cast<unsigned>(y >= height));
-    if (static_cast<bool>(static_cast<unsigned>(is_event) & static_cast<unsigned>(outside))) break;
-    *out = event_of_bits(event_bits(static_cast<std::uint32_t>(dt), x, y, word >> 11 & 1));
-    out += is_event ? 1 : 0;
-    y = kind == kAddressY ? x : y;
-    base_x = kind == kVectorBase ? x : base_x;
-    base_on = kind == kVectorBase ? word >> 11 & 1 : base_on;
-    dt = kind == kTimeLow ? told : dt;
   }
   block.count = static_cast<std::size_t>(out - block.events.data());
   y_ = y, base_x_ = base_x, base_on_ = base_on;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/io/evt3.h"
-
+// The words of Prophesee's cameras.
 #include <gtest/gtest.h>
 
 #include <random>
+
+#include "evpose/io/evt2.h"
+#include "evpose/io/evt3.h"
 
 namespace evpose {
 namespace {
@@ -147,6 +149,74 @@ TEST(Evt3, AnyWordsInPiecesOfAnyLengthGiveTheSame) {
     EXPECT_TRUE(decode(decoder, words, piece, &same) == expected) << piece;
     EXPECT_EQ(same.size(), triggers.size());
     EXPECT_EQ(decoder.faults().time_regressions, whole.faults().time_regressions);
+  }
+}
+
+TEST(Evt3, VectorsAreAsManySingleEvents) {
+  for (const ImageSize size : {ImageSize{}, ImageSize{107, 40}}) {  // the second cuts some of them off
+    Words vectors = join({high(3), low(1), row(20)}), singles = vectors;
+    for (unsigned mask = 0; mask < 4096; ++mask) {
+      const unsigned on = mask % 2, length = mask % 3 == 0 ? 8 : 12;
+      vectors = join({vectors, low(mask), {static_cast<std::uint16_t>(0x3000 | on << 11 | 100)}});
+      vectors.push_back(static_cast<std::uint16_t>((length == 8 ? 0x5000 : 0x4000) | mask));
+      singles = join({singles, low(mask)});
+      for (unsigned k = 0; k < length; ++k)
+        if ((mask >> k & 1) != 0) singles = join({singles, event(100 + k, on)});
+    }
+    Evt3Decoder a(size), b(size);
+    const auto rows = decode(a, vectors);
+    EXPECT_GT(rows.size(), size == ImageSize{} ? 20'000u : 10'000u);
+    EXPECT_TRUE(rows == decode(b, singles));
+    EXPECT_EQ(a.faults().outside, b.faults().outside);
+  }
+}
+
+/// Said as simply as can be: a word after the other, time never goes back, wraps left out.
+std::vector<Row> evt2_rows(const std::vector<std::uint32_t>& words, ImageSize size) {
+  std::vector<Row> rows;
+  std::int64_t high = -1, last = 0;
+  for (const std::uint32_t word : words) {
+    const int x = static_cast<int>(word >> 11 & 0x7FF), y = static_cast<int>(word & 0x7FF);
+    if (word >> 28 == 8) high = static_cast<std::int64_t>(word & 0xFFFFFFF) << 6;
+    if (word >> 28 > 1 || high < 0 || x >= size.width || y >= size.height) continue;
+    last = std::max(last, high + static_cast<std::int64_t>(word >> 22 & 63));
+    rows.push_back({last, x, y, static_cast<int>(word >> 28)});
+  }
+  return rows;
+}
+
+TEST(Evt2, FastAndInPiecesItIsWhatTheWordsSay) {
+  std::mt19937 random(2);
+  const auto below = [&random](unsigned n) { return static_cast<unsigned>(random() % n); };
+  for (const unsigned faults_in_1000 : {0u, 5u, 300u}) {
+    std::vector<std::uint32_t> words = {5, 0x80000010};  // the first comes before the time is known
+    unsigned low = 0, high = 0x10;
+    while (words.size() < 60'000) {
+      const bool faulty = below(1000) < faults_in_1000;
+      low += below(4) == 0 ? below(3) : 0;
+      if (low > 63) words.push_back(0x80000000 | (high += low >> 6)), low &= 63;
+      if (faulty && below(4) == 0) words.push_back(0x80000000 | (high -= below(2)));
+      const unsigned x = below(faulty ? 700 : 640), y = below(faulty ? 500 : 480);
+      const unsigned kind = faulty && below(4) == 0 ? 0xA : below(2);
+      words.push_back(kind << 28 | (faulty ? below(64) : low) << 22 | x << 11 | y);
+    }
+    const auto expected = evt2_rows(words, {640, 480});
+    const auto bytes = std::as_bytes(std::span(words));
+    for (const std::size_t piece : {bytes.size(), std::size_t{4096}, std::size_t{44}}) {
+      Evt2Decoder decoder({640, 480});
+      EventBlock block;
+      std::vector<Row> rows;
+      for (std::size_t at = 0; at < bytes.size();) {
+        block.start();
+        at += decoder.decode(bytes.subspan(at, std::min(piece, bytes.size() - at)), block);
+        for (std::size_t i = 0; i < block.count; ++i) {
+          const Event& e = block.events[i];
+          rows.push_back({block.time_us(i), e.x, e.y, e.on});
+        }
+      }
+      EXPECT_TRUE(rows == expected) << faults_in_1000 << " " << piece;
+      EXPECT_EQ(decoder.faults().outside > 0, faults_in_1000 > 0);
+    }
   }
 }
 

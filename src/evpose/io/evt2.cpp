@@ -80,7 +80,7 @@ Evt2Decoder::Evt2Decoder(ImageSize size)
 /// Groups of events that are all sound and in order, as most are, eight in a register. Returns the number of
 /// words taken.
 std::size_t Evt2Decoder::groups(const std::byte* bytes, std::size_t words, EventBlock& block) {
-  const std::int64_t behind_us = std::max<std::int64_t>(last_us_ - clock_.high_us(), 0);
+  const std::int64_t behind_us = last_us_ > clock_.high_us() ? last_us_ - clock_.high_us() : 0;
   if (behind_us > kLowUs) return 0;
   const auto high_dt = static_cast<std::uint32_t>(clock_.high_us() - block.base_us);
   const auto last_column = static_cast<std::int32_t>(width_) - 1;

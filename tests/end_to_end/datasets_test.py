@@ -79,6 +79,13 @@ class DatasetsTest(unittest.TestCase):
         folder = layouts.write_vector(self.root / "vector", self.recording)
         self.assert_same_run(self.tracked(folder), expected, epoch_s=1_640_000_000)
         self.assertEqual(self.info(folder)["recording"]["layout"], "VECtor sequence")
+        # The other scale's calibration beside it changes nothing.
+        shared = self.root / "vector/small_scale_calibration"
+        for name in ("joint_camera_extrinsic_results.yaml", "camera_imu_extrinsic_results1.yaml"):
+            mine = next(shared.glob(f"*{name}"))
+            mine.rename(shared / f"small_scale_{name}")
+            (shared / f"large_scale_{name}").write_text("nothing: of use\n")
+        self.assert_same_run(self.tracked(folder), expected, epoch_s=1_640_000_000)
 
     def test_vector_without_calibration_says_where_to_get_it(self):
         folder = layouts.write_vector(self.root / "vector", self.recording)
@@ -121,6 +128,18 @@ class DatasetsTest(unittest.TestCase):
         (folder / "groundtruth.txt").write_text((own / "groundtruth.tum").read_text())
         self.recording.write_contours(folder / "contours.ply")
         self.assert_same_run(self.tracked(folder), expected)
+
+    def test_a_bag_brings_its_ground_truth(self):
+        own = self.recording.write(self.root / "own")
+        expected = self.tracked(own)
+        folder = self.root / "bagged"
+        folder.mkdir()
+        self.assertEqual(run("convert", own, folder / "flight.bag").returncode, 0)
+        for name in ("camchain-imucam.yaml", "imu.yaml", "contours.ply"):
+            (folder / name).write_bytes((own / name).read_bytes())
+        for path in (folder, folder / "flight.bag"):
+            self.assert_same_run(self.tracked(path), expected)
+        self.assertEqual(self.info(folder)["recording"]["groundtruth"], str(folder / "flight.bag"))
 
     def test_calibration_can_be_given(self):
         folder = self.recording.write(self.root / "own")

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How fast each format of events is read, from the file in the page cache to checked packets, on one core.
 #include <benchmark/benchmark.h>
+#include <hdf5.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <cinttypes>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -123,6 +125,16 @@ std::string written(const std::vector<EventPacket>& packets, const std::string& 
   return path;
 }
 
+void count(benchmark::State& state, const std::string& path, std::int64_t events) {
+  const auto bytes = static_cast<double>(std::filesystem::file_size(path));
+  state.counters["Mev/s"] =
+      benchmark::Counter(static_cast<double>(events) * 1e-6, benchmark::Counter::kIsRate);
+  state.counters["MB/s"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) * bytes * 1e-6, benchmark::Counter::kIsRate);
+  state.counters["bytes/event"] =
+      bytes * static_cast<double>(state.iterations()) / static_cast<double>(events);
+}
+
 void read_file(benchmark::State& state, const std::string& path) {
   std::int64_t events = 0;
   for (auto _ : state) {
@@ -139,13 +151,7 @@ void read_file(benchmark::State& state, const std::string& path) {
       benchmark::DoNotOptimize(packet.events.data());
     }
   }
-  const auto bytes = static_cast<double>(std::filesystem::file_size(path));
-  state.counters["Mev/s"] =
-      benchmark::Counter(static_cast<double>(events) * 1e-6, benchmark::Counter::kIsRate);
-  state.counters["MB/s"] =
-      benchmark::Counter(static_cast<double>(state.iterations()) * bytes * 1e-6, benchmark::Counter::kIsRate);
-  state.counters["bytes/event"] =
-      bytes * static_cast<double>(state.iterations()) / static_cast<double>(events);
+  count(state, path, events);
 }
 
 /// What cannot be beaten: as many events, copied from one place in memory to another.
@@ -159,6 +165,43 @@ void copy(benchmark::State& state) {
   const auto total = static_cast<double>(state.iterations()) * static_cast<double>(kEvents);
   state.counters["Mev/s"] = benchmark::Counter(total * 1e-6, benchmark::Counter::kIsRate);
   state.counters["MB/s"] = benchmark::Counter(total * sizeof(Event) * 1e-6, benchmark::Counter::kIsRate);
+}
+
+/// Another's decoder of the same file: the HDF5 library, all of each column at once, unpacked and no more.
+void read_columns(benchmark::State& state, const std::string& path) {
+  std::int64_t events = 0;
+  for (auto _ : state) {
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    for (const char* name : {"events/x", "events/y", "events/p", "events/t"}) {
+      const hid_t set = H5Dopen2(file, name, H5P_DEFAULT), type = H5Dget_type(set), space = H5Dget_space(set);
+      const auto rows = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space));
+      std::vector<std::byte> column(rows * H5Tget_size(type));
+      if (H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, column.data()) < 0) std::abort();
+      benchmark::DoNotOptimize(column.data());
+      if (name == std::string("events/t")) events += static_cast<std::int64_t>(rows);
+      H5Sclose(space), H5Tclose(type), H5Dclose(set);
+    }
+    H5Fclose(file);
+  }
+  count(state, path, events);
+}
+
+/// Another's reader of text: the C library's, numbers and no checks.
+void scan_text(benchmark::State& state, const std::string& path) {
+  std::int64_t events = 0;
+  for (auto _ : state) {
+    std::FILE* const file = std::fopen(path.c_str(), "r");
+    if (file == nullptr) std::abort();
+    std::int64_t t = 0;
+    int x = 0, y = 0, p = 0;
+    for (int c = std::fgetc(file); c == '#' || c == '%'; c = std::fgetc(file))
+      while (c != '\n' && c != EOF) c = std::fgetc(file);
+    std::fseek(file, -1, SEEK_CUR);
+    while (std::fscanf(file, "%" SCNd64 " %d %d %d", &t, &x, &y, &p) == 4) ++events;  // NOLINT(cert-err34-c)
+    benchmark::DoNotOptimize(t);
+    std::fclose(file);
+  }
+  count(state, path, events);
 }
 
 /// A file of so many gigabytes as nobody wants to hold in memory: written, then read once.
@@ -195,10 +238,13 @@ std::string shared_folder() {
   return std::string(variable != nullptr ? variable : "../shared") + "/data/real/formats/";
 }
 
-void add(const std::string& name, const std::function<std::string()>& make, bool remove) {
+using Read = void (*)(benchmark::State&, const std::string&);
+
+void add(const std::string& name, const std::function<std::string()>& make, bool remove,
+         Read read = read_file) {
   benchmark::RegisterBenchmark(("decode/" + name).c_str(), [=](benchmark::State& state) {
     const std::string path = make();
-    read_file(state, path);
+    read(state, path);
     if (remove) std::filesystem::remove(path);
   })->Unit(benchmark::kMillisecond);
 }
@@ -212,9 +258,14 @@ bool register_all() {
       "synthetic EVT2.1", [] { return file_of(evt21_file(synthetic_packets())); }, false);
   add(
       "synthetic DAT", [] { return file_of(dat_file(synthetic_packets())); }, false);
-  for (const char* extension : {".raw", ".h5", ".txt", ".csv"})
+  for (const char* extension : {".raw", ".h5", ".txt", ".csv", ".bag", ".mcap"})
     add(
         std::string("synthetic ") + extension, [=] { return written(synthetic_packets(), extension); }, true);
+  add(
+      "others: libhdf5, columns of synthetic .h5", [] { return written(synthetic_packets(), ".h5"); }, true,
+      read_columns);
+  add(
+      "others: fscanf, synthetic .txt", [] { return written(synthetic_packets(), ".txt"); }, true, scan_text);
   if (const char* gigabytes = std::getenv("EVPOSE_BENCH_GB"))
     benchmark::RegisterBenchmark("decode/long EVT3",
                                  [=](benchmark::State& state) { long_file(state, std::atof(gigabytes)); })
@@ -223,7 +274,8 @@ bool register_all() {
   std::error_code none;
   for (const char* name :
        {"prophesee_evt2_gen3.raw", "prophesee_evt3_gen41.raw", "dvxplorer_events_imu.aedat4",
-        "event_stream_dvs_cut.es", "ncaltech101_faces_easy_0001.bin"})
+        "event_stream_dvs_cut.es", "ncaltech101_faces_easy_0001.bin", "event_packet_evt3_ros1.bag",
+        "event_packet_evt3_ros2.db3", "event_packet_libcaer_cmp.mcap"})
     if (std::filesystem::exists(shared_folder() + name, none))
       add(
           name, [=] { return shared_folder() + name; }, false);

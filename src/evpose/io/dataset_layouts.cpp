@@ -151,10 +151,18 @@ constexpr ImuNoise kVectorNoise = {.accel_density = 1.26557e-3,
                                    .gyro_walk = 6.9961e-6,
                                    .rate_hz = 200};
 
-/// The transform of a name in a VECtor file found near, or nothing.
+/// The rig was calibrated twice: for these sequences, with motion capture, and for those in large rooms.
+const char* vector_scale(const std::string& sequence) {
+  for (const char* name : {"board", "corner", "robot", "desk", "sofa", "mountain", "hdr"})
+    if (sequence.starts_with(name)) return "small_scale_";
+  return "large_scale_";
+}
+
+/// A VECtor file found near, that of the sequence's scale rather than another; or nothing.
 Expected<std::optional<CalibrationFile>> vector_file(const Look& look, const std::string& containing,
                                                      FoundRecording& out, const std::string& use) {
-  const auto name = look.find_near(".yaml", containing);
+  auto name = look.find_near(".yaml", vector_scale(out.files.name) + containing);
+  if (!name) name = look.find_near(".yaml", containing);
   if (!name) {
     miss(out, look.path("*" + containing + "*.yaml"), "no such file: " + use,
          "download the calibration folder of VECtor beside the sequences");
@@ -279,12 +287,13 @@ std::optional<std::string> find_events(const Look& look) {
   return std::nullopt;
 }
 
-/// True where one file holds both streams.
-bool holds_imu(const std::string& path) {
+/// True where the file of the events holds such a stream, too.
+bool holds(const std::string& path, StreamKind kind) {
+  if (path.ends_with(".h5")) return false;
   const auto streams = list_streams(path);
-  if (!streams) return false;
-  return std::any_of(streams->begin(), streams->end(),
-                     [](const StreamInfo& stream) { return stream.kind == StreamKind::imu; });
+  return streams && std::any_of(streams->begin(), streams->end(), [&](const StreamInfo& stream) {
+           return stream.kind == kind && stream.messages != 0;
+         });
 }
 
 /// Fills what recording.yaml or an own layout has not named.
@@ -295,12 +304,14 @@ void look_for_the_rest(const Look& look, FoundRecording& out) {
     f.calibration = find_calibration(look);
   if (!f.imu && !look.has("imu.csv")) {
     f.imu = find_imu(look);
-    if (!f.imu && f.events && !f.events->ends_with(".h5") && holds_imu(look.path(*f.events)))
-      f.imu = f.events;
+    if (!f.imu && f.events && holds(look.path(*f.events), StreamKind::imu)) f.imu = f.events;
   }
-  if (!f.groundtruth && !look.has("groundtruth.tum"))
+  if (!f.groundtruth && !look.has("groundtruth.tum")) {
     for (const char* usual : {"groundtruth.txt", "groundtruth.csv", "stamped_groundtruth.txt"})
       if (!f.groundtruth) f.groundtruth = look.find(usual);
+    if (!f.groundtruth && f.events && holds(look.path(*f.events), StreamKind::poses))
+      f.groundtruth = f.events;
+  }
   if (!f.contours && !look.has("contours.ply")) f.contours = look.find("contours.ply");
 }
 
@@ -340,7 +351,7 @@ FoundRecording look_beside(const fs::path& file) {
   out.layout = "single file";
   out.files.name = file.stem().string();
   out.files.events = file.filename().string();
-  if (holds_imu(file.string())) out.files.imu = out.files.events;
+  if (holds(file.string(), StreamKind::imu)) out.files.imu = out.files.events;
   look_for_the_rest(look, out);
   return out;
 }

@@ -15,6 +15,7 @@
 
 #include "evpose/io/event_reader.h"
 #include "evpose/io/event_writer.h"
+#include "evpose/io/input_file.h"
 
 namespace evpose {
 namespace {
@@ -186,20 +187,23 @@ void read_columns(benchmark::State& state, const std::string& path) {
   count(state, path, events);
 }
 
-/// Another's reader of text: the C library's, numbers and no checks.
+/// Another's reader of text: the C library's sscanf on each line, with no checks.
 void scan_text(benchmark::State& state, const std::string& path) {
   std::int64_t events = 0;
   for (auto _ : state) {
-    std::FILE* const file = std::fopen(path.c_str(), "r");
-    if (file == nullptr) std::abort();
+    auto lines = LineReader::open(path);
+    if (!lines) std::abort();
+    std::string_view view;
+    std::string line;
     std::int64_t t = 0;
     int x = 0, y = 0, p = 0;
-    for (int c = std::fgetc(file); c == '#' || c == '%'; c = std::fgetc(file))
-      while (c != '\n' && c != EOF) c = std::fgetc(file);
-    std::fseek(file, -1, SEEK_CUR);
-    while (std::fscanf(file, "%" SCNd64 " %d %d %d", &t, &x, &y, &p) == 4) ++events;  // NOLINT(cert-err34-c)
-    benchmark::DoNotOptimize(t);
-    std::fclose(file);
+    while (*lines->next(view)) {
+      line = view;
+      const int fields =
+          std::sscanf(line.c_str(), "%" SCNd64 " %d %d %d", &t, &x, &y, &p);  // NOLINT(cert-err34-c)
+      events += fields == 4 ? 1 : 0;
+      benchmark::DoNotOptimize(t);
+    }
   }
   count(state, path, events);
 }
@@ -265,7 +269,7 @@ bool register_all() {
       "others: libhdf5, columns of synthetic .h5", [] { return written(synthetic_packets(), ".h5"); }, true,
       read_columns);
   add(
-      "others: fscanf, synthetic .txt", [] { return written(synthetic_packets(), ".txt"); }, true, scan_text);
+      "others: sscanf, synthetic .txt", [] { return written(synthetic_packets(), ".txt"); }, true, scan_text);
   if (const char* gigabytes = std::getenv("EVPOSE_BENCH_GB"))
     benchmark::RegisterBenchmark("decode/long EVT3",
                                  [=](benchmark::State& state) { long_file(state, std::atof(gigabytes)); })

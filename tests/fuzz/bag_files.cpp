@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 
 #include "evpose/io/bag_messages.h"
@@ -17,11 +18,19 @@ namespace {
 
 using namespace evpose;
 
-/// SQLite insists on a name in the file system.
+/// A name in the file system, on which SQLite insists; in memory, where there is such a place.
+std::string make_name() {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const fs::path memory = "/dev/shm";
+  const fs::path folder = fs::is_directory(memory, ignored) ? memory : fs::temp_directory_path();
+  return (folder / ("evpose-fuzz-" + std::to_string(::getpid()) + ".db3")).string();
+}
+
 const std::string& named_file(fuzz::Bytes bytes) {
-  static const std::string path =
-      (std::filesystem::temp_directory_path() / ("evpose-fuzz-" + std::to_string(::getpid()) + ".db3"))
-          .string();
+  static const std::string path = make_name();
+  static const int registered = std::atexit([] { std::remove(path.c_str()); });
+  EVPOSE_CHECK(registered == 0);
   std::FILE* file = std::fopen(path.c_str(), "wb");
   EVPOSE_CHECK(file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size());
   EVPOSE_CHECK(std::fclose(file) == 0);

@@ -218,7 +218,45 @@ def live_packets():
             packet(3, 2, 0, words))
 
 
+def corner():
+    """Points along three edges that meet."""
+    return [[0.1 * i if k == axis else 0.0 for k in range(3)] for axis in range(3) for i in range(8)]
+
+
+def ply(kind):
+    head = f"ply\nformat {kind} 1.0\nelement vertex 24\n"
+    head += "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz")) + "property uchar kind\nend_header\n"
+    rows = [(*p, 0.6, 0.0, 0.8, 1) for p in corner()]
+    if kind == "ascii":
+        return (head + "".join(" ".join(map(str, row)) + "\n" for row in rows)).encode()
+    return head.encode() + b"".join(struct.pack("<6fB" if "little" in kind else ">6fB", *row) for row in rows)
+
+
+def pcd(kind):
+    head = ("VERSION .7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 24\nHEIGHT 1\n"
+            f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 24\nDATA {kind}\n").encode()
+    rows = [(*p, 0.5) for p in corner()]
+    if kind == "ascii":
+        return head + "".join(" ".join(map(str, row)) + "\n" for row in rows).encode()
+    if kind == "binary":
+        return head + b"".join(struct.pack("<4f", *row) for row in rows)
+    columns = b"".join(struct.pack("<24f", *column) for column in zip(*rows))
+    packed = b"".join(bytes([len(columns[i:i + 32]) - 1]) + columns[i:i + 32] for i in range(0, len(columns), 32))
+    return head + struct.pack("<II", len(packed), len(columns)) + packed  # LZF of literals only
+
+
+def las():
+    head = bytearray(227)
+    head[0:4], head[24:26] = b"LASF", b"\x01\x02"
+    struct.pack_into("<HI", head, 94, 227, 227)
+    struct.pack_into("<BHI", head, 104, 0, 20, 24)
+    struct.pack_into("<6d", head, 131, 0.001, 0.001, 0.001, 100, 200, 0)
+    return bytes(head) + b"".join(struct.pack("<3iH6x", *(round(1000 * v) for v in p), 7) for p in corner())
+
+
 SEEDS = {
+    "clouds": [lambda: ply("ascii"), lambda: ply("binary_little_endian"), lambda: ply("binary_big_endian"),
+               lambda: pcd("ascii"), lambda: pcd("binary"), lambda: pcd("binary_compressed"), las],
     "mavlink": [mavlink],
     "live_packets": [live_packets, lambda: live_packets()[:190], lambda: b"\xff" + live_packets()[1:]],
     "calibrations": [lambda text=text: text.encode() for text in CALIBRATIONS],

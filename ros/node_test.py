@@ -96,8 +96,11 @@ def check(recording, folder, processes):
         rospy.Subscriber(topic, kind, keep(name), queue_size=2000)
     refused = subprocess.run([NODE, "__name:=incomplete"], capture_output=True, text=True, timeout=20)
     assert refused.returncode == 2 and "~map" in refused.stderr, refused
-    node = subprocess.Popen([NODE, f"_map:={folder}/contours.ply", f"_calibration:={folder}/camchain-imucam.yaml",
-                             f"_imu_model:={folder}/imu.yaml", "_init:=0,0,1,0,0,0,1"])
+    # As evpose starts it: the process becomes the node.
+    node = subprocess.Popen([EVPOSE, "serve", "ros://events,imu", "--ros", "--map", f"{folder}/contours.ply", "--calibration",
+                             f"{folder}/camchain-imucam.yaml", "--imu-model", f"{folder}/imu.yaml", "--init", "0,0,1,0,0,0,1",
+                             "--set", "rate_hz=300", "--set", "registration.max_iterations=6"],
+                            env={**os.environ, "PATH": f"{pathlib.Path(NODE).parent}:{os.environ['PATH']}"})
     processes.append(node)
     sent = play(bag_in)
     assert sent["/imu"] == len(recording.imu), sent

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "commands.h"
@@ -11,21 +13,38 @@
 #include "evpose/io/contour_files.h"
 #include "evpose/io/map_h5.h"
 #include "evpose/io/ply.h"
+#include "evpose/mavlink/frames.h"
 #include "evpose/report/map_accuracy.h"
 #include "evpose/report/map_page.h"
 
 namespace evpose {
 namespace {
 
-int import_map(const std::string& contours, const std::string& occluders, const std::string& output) {
+/// Where the map that is imported lies in the world, as far as it is told.
+struct Placing {
+  std::optional<double> heading_deg;
+  std::vector<double> origin_llh;
+};
+
+int import_map(const std::string& contours, const std::string& occluders, const Placing& placing,
+               const std::string& output) {
   auto map = read_contour_map(contours);
   if (!map) return bad_input(map.error());
+  auto placement = read_map_placement(contours);
+  if (!placement) return bad_input(placement.error());
+  if (placing.heading_deg) placement->T_ned_map = ned_from_heading(*placing.heading_deg * M_PI / 180);
+  if (const auto& llh = placing.origin_llh; !llh.empty()) {
+    if (llh.size() != 3 || std::abs(llh[0]) > 90 || std::abs(llh[1]) > 180)
+      return bad_input(
+          {"--origin", "is no place on earth", "give latitude,longitude in degrees, height in m"});
+    placement->origin_llh = Eigen::Vector3d(llh[0], llh[1], llh[2]);
+  }
   if (!occluders.empty()) {
     auto mesh = read_ply_mesh(occluders, map->anchor);
     if (!mesh) return bad_input(mesh.error());
     map->occluders = std::move(*mesh);
   }
-  if (const auto ok = write_map_h5(output, *map); !ok) return bad_input(ok.error());
+  if (const auto ok = write_map_h5(output, *map, "", *placement); !ok) return bad_input(ok.error());
   return 0;
 }
 
@@ -89,15 +108,24 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   add_map_build(*map, run);
   struct Options {
     std::string input, occluders, output = "map.h5", report;
+    Placing placing;
     double pitch_deg = 30;
     std::vector<double> heights_m;
   };
   auto o = std::make_shared<Options>();
-  auto* from_contours = map->add_subcommand("import", "Make a map file from contour points (PLY, PCD)");
+  auto* from_contours = map->add_subcommand(
+      "import", "Make a map file from contour points (PLY, PCD), or place one in the world");
   from_contours->add_option("contours", o->input, "contours.ply, or any cloud of edge points")->required();
   from_contours->add_option("--occluders", o->occluders, "PLY mesh that hides contours behind it");
   from_contours->add_option("-o,--output", o->output, "map file")->capture_default_str();
-  from_contours->callback([o, &run] { run = [o] { return import_map(o->input, o->occluders, o->output); }; });
+  from_contours->add_option("--heading", o->placing.heading_deg,
+                            "compass heading of the map's x axis, degrees; default: 90, x is east");
+  from_contours
+      ->add_option("--origin", o->placing.origin_llh,
+                   "of the map: latitude,longitude in degrees, height above the ellipsoid in m")
+      ->delimiter(',');
+  from_contours->callback(
+      [o, &run] { run = [o] { return import_map(o->input, o->occluders, o->placing, o->output); }; });
   auto* info = map->add_subcommand("info", "Counts, lengths and bounds of a map");
   info->add_option("map", o->input, "map.h5, PLY or PCD")->required();
   info->add_option("--report", o->report, "write the quality report, one HTML file");

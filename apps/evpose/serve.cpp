@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "serve_live.h"
+#include "serve_ros.h"
 
 namespace evpose {
 namespace {
@@ -18,7 +19,13 @@ int dump_config(const ServeRequest& request) {
   return 0;
 }
 
-int run_serve(const ServeRequest& request) {
+int run_serve(const ServeRequest& request, bool ros) {
+  const std::string& source = request.track.recording;
+  if (is_ros_address(source)) return bad_input(start_ros_node(request));
+  if (ros)
+    return bad_input({"--ros", "the ROS node takes its input from topics",
+                      "name the source ros; a recording gets there by `evpose convert " + source +
+                          " RECORDING.bag` and `rosbag play`"});
   const auto status = serve(request);
   return status ? *status : bad_input(status.error());
 }
@@ -35,7 +42,7 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   auto* source =
       command->add_option("source", track.recording,
                           "a recording; or udp://HOST:PORT, tcp://HOST:PORT, where a camera's driver "
-                          "sends packets");
+                          "sends packets; or ros, ros://EVENTS,IMU: topics of ROS");
   command->add_option("--map", track.map, "contours (PLY, PCD, map.h5); default: the recording's own");
   command->add_option("--calibration", track.calibration, "calibration of any kind that evpose info knows");
   command->add_option("--imu-model", request->imu_model,
@@ -50,6 +57,8 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
           ->expected(0, 1)
           ->check(CLI::Range(0, 65535))
           ->default_str("8088");
+  auto ros = std::make_shared<bool>(false);
+  command->add_flag("--ros", *ros, "of the source ros: publish by ROS (it always does)");
   auto* speed_option = command->add_option(
       "--speed", *speed, "of a recording against the wall clock; 0: as fast as it is tracked, nothing shed");
   command->add_option("-o,--output", track.output, "run folder; default: none is written");
@@ -63,7 +72,7 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
       request->track.assignments.push_back("replay.speed=" + std::to_string(*speed));
       if (*speed == 0) request->track.assignments.emplace_back("queue.shed=false");
     }
-    run = [=] { return *dump ? dump_config(*request) : run_serve(*request); };
+    run = [=] { return *dump ? dump_config(*request) : run_serve(*request, *ros); };
   });
 }
 

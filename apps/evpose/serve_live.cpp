@@ -13,6 +13,7 @@
 #include "evpose/io/calibration.h"
 #include "evpose/io/config_yaml.h"
 #include "evpose/io/kalibr.h"
+#include "evpose/io/map_h5.h"
 #include "evpose/mavlink/link.h"
 #include "evpose/serve/packet_source.h"
 #include "evpose/view/viewer.h"
@@ -91,11 +92,14 @@ Expected<TrackJob> prepare_source(const ServeRequest& request, const RunConfig& 
   return job;
 }
 
-VehicleFrames vehicle_frames(const FramesConfig& c, const Recording& recording) {
+/// recording.yaml knows best, then the map file, then the configuration.
+VehicleFrames vehicle_frames(const FramesConfig& c, const Recording& recording,
+                             const MapPlacement& placement) {
   VehicleFrames out;
   constexpr double kRad = M_PI / 180;
-  out.T_ned_map = recording.T_ned_map ? Pose::from_matrix(*recording.T_ned_map)
-                                      : ned_from_heading(c.map_heading_deg * kRad);
+  out.T_ned_map = recording.T_ned_map   ? Pose::from_matrix(*recording.T_ned_map)
+                  : placement.T_ned_map ? *placement.T_ned_map
+                                        : ned_from_heading(c.map_heading_deg * kRad);
   out.T_body_vehicle.p = {c.vehicle_x_m, c.vehicle_y_m, c.vehicle_z_m};
   out.T_body_vehicle.q = so3::exp({0, 0, c.vehicle_yaw_deg * kRad}) *
                          so3::exp({0, c.vehicle_pitch_deg * kRad, 0}) *
@@ -103,11 +107,19 @@ VehicleFrames vehicle_frames(const FramesConfig& c, const Recording& recording) 
   return out;
 }
 
+/// The map's own origin, where the configuration names none.
+void take_origin(const MapPlacement& placement, MavlinkConfig& c) {
+  if (!placement.origin_llh || c.origin_latitude_deg != 0 || c.origin_longitude_deg != 0) return;
+  c.origin_latitude_deg = placement.origin_llh->x();
+  c.origin_longitude_deg = placement.origin_llh->y();
+  if (c.origin_altitude_m == 0) c.origin_altitude_m = placement.origin_llh->z();
+}
+
 /// Everything that hears of the poses.
 class Outputs {
  public:
-  Outputs(const ServeConfig& config, const TrackJob& job)
-      : frames_(vehicle_frames(config.frames, job.recording)) {}
+  Outputs(const ServeConfig& config, const TrackJob& job, const MapPlacement& placement)
+      : frames_(vehicle_frames(config.frames, job.recording, placement)) {}
 
   Status open(const ServeRequest& request, const ServeConfig& config, const TrackJob& job) {
     if (request.view >= 0) {
@@ -295,7 +307,10 @@ Expected<int> serve(const ServeRequest& request) {
     return Tracker::create(job->setup, tracker, start, wall_s);
   };
   if (const auto possible = make(job->start, false); !possible) return possible.error();
-  Outputs outputs(*config, *job);
+  const auto placement = read_map_placement(job->map->source);
+  if (!placement) return placement.error();
+  take_origin(*placement, config->mavlink);
+  Outputs outputs(*config, *job, *placement);
   if (auto ok = outputs.open(request, *config, *job); !ok) return ok.error();
 
   Session session(

@@ -223,6 +223,29 @@ TEST(MapH5, WrittenMapsReadBack) {
   EXPECT_EQ(complete->points.size(), map.points.size());
 }
 
+TEST(MapH5, WhereAMapLiesInTheWorldIsKept) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_map_h5(folder / "plain.h5", small_map()).ok());
+  const auto plain = read_map_placement(folder / "plain.h5");
+  ASSERT_TRUE(plain.ok()) << error_line(plain);
+  EXPECT_FALSE(plain->T_ned_map || plain->origin_llh);
+  MapPlacement placement;
+  placement.T_ned_map = Pose{so3::exp({0.1, -0.2, 2.0}), {5, -6, 7}};
+  placement.origin_llh = Eigen::Vector3d(47.397, 8.545, 488.25);
+  ASSERT_TRUE(write_map_h5(folder / "placed.h5", small_map(), "", placement).ok());
+  const auto again = read_map_placement(folder / "placed.h5");
+  ASSERT_TRUE(again.ok()) << error_line(again);
+  ASSERT_TRUE(again->T_ned_map && again->origin_llh);
+  EXPECT_LT((again->T_ned_map->matrix() - placement.T_ned_map->matrix()).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_EQ(*again->origin_llh, *placement.origin_llh);
+  EXPECT_TRUE(read_map_h5(folder / "placed.h5").ok());  // the checksum covers it
+  placement.origin_llh = Eigen::Vector3d(91, 0, 0);
+  ASSERT_TRUE(write_map_h5(folder / "off.h5", small_map(), "", placement).ok());
+  EXPECT_TRUE(says(error_line(read_map_placement(folder / "off.h5")), {"off.h5", "origin_llh"}));
+  const auto no_map = read_map_placement(folder.file("points.ply", "ply\n"));
+  EXPECT_TRUE(no_map.ok() && !no_map->T_ned_map);
+}
+
 TEST(MapH5, SameMapSameBytes) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_map_h5(folder / "a.h5", small_map()).ok());

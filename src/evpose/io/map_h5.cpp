@@ -2,10 +2,12 @@
 #include "evpose/io/map_h5.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "evpose/io/crc32.h"
 #include "evpose/io/hdf5_file.h"
+#include "evpose/io/input_file.h"
 #include "evpose/io/map_h5_meta.h"
 #include "evpose/map/triangulation.h"
 
@@ -14,6 +16,7 @@ namespace {
 
 constexpr std::uint64_t kMostRows = std::uint64_t{1} << 31;
 constexpr double kFarthest = 1e7;  // m
+constexpr std::array<char, 4> kHdf5Magic = {'\x89', 'H', 'D', 'F'};
 const std::string kDamaged = "the file is damaged; copy or build it again";
 
 template <class T>
@@ -312,6 +315,35 @@ Expected<ContourMap> read_map_h5(const std::string& path) {
   if (auto status = check_whole(*file); !status) return status.error();
   if (map.occluders.triangles.empty()) map.occluders = triangulated(map.planes, map.polygons);
   return map;
+}
+
+Expected<MapPlacement> read_map_placement(const std::string& path) {
+  MapPlacement out;
+  if (const auto opened = open_to_read(path)) {
+    std::array<char, 4> head{};
+    if (std::fread(head.data(), 1, head.size(), opened->stream.get()) != head.size() || head != kHdf5Magic)
+      return out;
+  }
+  const auto file = Hdf5File::open(path);
+  if (!file) return file.error();
+  const auto T = file->attribute_numbers("/meta", "T_ned_map");
+  if (T && !(T->size() == kNedFromEnu.size() && std::equal(T->begin(), T->end(), kNedFromEnu.begin()))) {
+    using Matrix = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+    const Eigen::Matrix4d M =
+        T->size() == 16 ? Matrix(Eigen::Map<const Matrix>(T->data())) : Matrix(Matrix::Zero());
+    const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
+    if (!M.allFinite() || !((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6) ||
+        R.determinant() < 0)
+      return Error{path + ": /meta", "T_ned_map is no rigid transform", kDamaged};
+    out.T_ned_map = Pose::from_matrix(M);
+  }
+  if (const auto llh = file->attribute_numbers("/meta", "origin_llh")) {
+    if (llh->size() != 3 || !(std::abs((*llh)[0]) <= 90) || !(std::abs((*llh)[1]) <= 180) ||
+        !(std::abs((*llh)[2]) <= kFarthest))
+      return Error{path + ": /meta", "origin_llh is no place on earth", kDamaged};
+    out.origin_llh = Eigen::Vector3d((*llh)[0], (*llh)[1], (*llh)[2]);
+  }
+  return out;
 }
 
 }  // namespace evpose

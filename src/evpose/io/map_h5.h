@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "evpose/core/error.h"
+#include "evpose/core/pose.h"
 #include "evpose/map/contour_map.h"
 
 namespace evpose {
@@ -15,9 +17,20 @@ namespace evpose {
 /// (named).
 Expected<ContourMap> read_map_h5(const std::string& path);
 
+/// Where a map lies in the world.
+struct MapPlacement {
+  std::optional<Pose> T_ned_map;  ///< local north-east-down from the map; unset: x east, y north, z up
+  std::optional<Eigen::Vector3d> origin_llh;  ///< of the local frame: degrees, degrees, m above the ellipsoid
+};
+
+/// What the map file says of it; nothing where it lies as a map does by default, or is no map file. Errors:
+/// T_ned_map is no rigid transform, origin_llh no place on earth.
+Expected<MapPlacement> read_map_placement(const std::string& path);
+
 /// Contours are numbered anew, in the order of their first points; points of one contour that differ in kind,
 /// planes or contrast become several. The mesh of occluders is written unless there are polygons to make it
 /// of. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes.
-Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc = "");
+Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc = "",
+                    const MapPlacement& placement = {});
 
 }  // namespace evpose

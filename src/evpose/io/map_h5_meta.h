@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -9,6 +10,9 @@
 #include "evpose/io/hdf5_file.h"
 
 namespace evpose {
+
+/// Local north-east-down from a map whose x points east, y north and z up, row by row.
+inline constexpr std::array<double, 16> kNedFromEnu = {0, 1, 0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
 
 /// Checksum of a map file as a whole: of its datasets' names, shapes and own checksums, and of the attributes
 /// of /meta (formats 3).

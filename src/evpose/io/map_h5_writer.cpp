@@ -100,7 +100,7 @@ class Writer {
   Status planes(const std::vector<MapPlane>& planes);
   Status polygons(const std::vector<MapPolygon>& polygons);
   Status mesh(const TriangleMesh& mesh);
-  Status meta(const ContourMap& map, const std::string& created_utc);
+  Status meta(const ContourMap& map, const std::string& created_utc, const MapPlacement& placement);
   Status close();
 
  private:
@@ -180,9 +180,12 @@ Status Writer::mesh(const TriangleMesh& mesh) {
                         dataset("/mesh/triangles", NumberType::u32, triangles, 3)});
 }
 
-Status Writer::meta(const ContourMap& map, const std::string& created_utc) {
+Status Writer::meta(const ContourMap& map, const std::string& created_utc, const MapPlacement& placement) {
   const std::uint32_t major = 1, minor = 0;
-  const double enu_to_ned[16] = {0, 1, 0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
+  std::array<double, 16> T_ned_map = kNedFromEnu;
+  if (placement.T_ned_map)
+    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(T_ned_map.data()) =
+        placement.T_ned_map->matrix();
   Eigen::Vector3d low = map.anchor, high = map.anchor;
   for (std::size_t i = 0; i < map.points.size(); ++i) {
     const Eigen::Vector3d p = map.position(i);
@@ -202,7 +205,10 @@ Status Writer::meta(const ContourMap& map, const std::string& created_utc) {
        file_.set_attribute("/meta", "units", std::string("m")),
        file_.set_attribute("/meta", "frame", map.frame),
        file_.set_attribute("/meta", "anchor", NumberType::f64, {3}, map.anchor.data()),
-       file_.set_attribute("/meta", "T_ned_map", NumberType::f64, {4, 4}, enu_to_ned),
+       file_.set_attribute("/meta", "T_ned_map", NumberType::f64, {4, 4}, T_ned_map.data()),
+       placement.origin_llh
+           ? file_.set_attribute("/meta", "origin_llh", NumberType::f64, {3}, placement.origin_llh->data())
+           : Status(),
        file_.set_attribute("/meta", "aabb", NumberType::f64, {6}, aabb),
        source.empty() ? Status() : file_.set_attribute("/meta", "source_name", source)});
 }
@@ -216,7 +222,8 @@ Status Writer::close() {
 
 }  // namespace
 
-Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc) {
+Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc,
+                    const MapPlacement& placement) {
   auto temporary = TemporaryFile::create(path);
   if (!temporary) return temporary.error();
   auto file = Hdf5File::create(*temporary);
@@ -225,7 +232,7 @@ Status write_map_h5(const std::string& path, const ContourMap& map, const std::s
   if (auto status = first_failure({writer.contours(columns_of(map)), writer.planes(map.planes),
                                    writer.polygons(map.polygons),
                                    map.polygons.empty() ? writer.mesh(map.occluders) : Status(),
-                                   writer.meta(map, created_utc), writer.close()});
+                                   writer.meta(map, created_utc, placement), writer.close()});
       !status)
     return status;
   return temporary->commit();

@@ -100,13 +100,14 @@ def figures(evpose, shared):
 
 
 def soak(evpose, shared, minutes):
-    served = Served(evpose, shared, "room_hover", "room", 60 * minutes + 5, None, "replay.loop=true")
-    samples = []
-    for _ in range(round(60 * minutes)):
-        time.sleep(1)
-        samples.append(memory_mb(served.process))
-    served.process.terminate()
-    printed, heard = served.finish()
+    with tempfile.TemporaryDirectory() as scratch:
+        served = Served(evpose, shared, "room_hover", "room", 60 * minutes + 5, f"{scratch}/run", "replay.loop=true")
+        samples = []
+        for _ in range(round(60 * minutes)):
+            time.sleep(1)
+            samples.append(memory_mb(served.process))
+        served.process.terminate()
+        printed, heard = served.finish()
     tenth = max(1, len(samples) // 10)
     print(f"memory: {sum(samples[tenth:2 * tenth]) / tenth:.1f} MB after a tenth of {minutes} minutes, "
           f"{sum(samples[-tenth:]) / tenth:.1f} MB over the last tenth, largest {max(samples):.1f} MB")

@@ -160,6 +160,13 @@ new ResizeObserver(resize).observe($("scene").parentElement);
 
 // ---- the picture ----
 
+// Green where an event has just been at the projected point, through yellow to violet where none was: colours that
+// events do not have.
+const RESIDUAL = Array.from({ length: 32 }, (_, i) => {
+  const [from, to] = i < 16 ? [[61, 220, 132], [255, 225, 77]] : [[255, 225, 77], [224, 92, 255]], share = (i % 16) / 15;
+  return `rgb(${from.map((v, k) => Math.round(v + share * (to[k] - v))).join(" ")})`;
+});
+
 function showPicture(buffer) {
   const head = new DataView(buffer);
   const width = head.getUint32(0, true), height = head.getUint32(4, true), points = head.getUint32(8, true);
@@ -179,8 +186,8 @@ function showPicture(buffer) {
   const begin = Math.ceil((16 + width * height) / 4) * 4;
   const list = new Float32Array(buffer, begin, 3 * points);
   for (let i = 0; i < points; ++i) {
-    context.fillStyle = list[3 * i + 2] > 0 ? "#3ddc84" : "#d8a800";
-    context.fillRect(list[3 * i] - 0.5, list[3 * i + 1] - 0.5, 1, 1);
+    context.fillStyle = RESIDUAL[Math.min(RESIDUAL.length - 1, Math.max(0, Math.floor(list[3 * i + 2] * RESIDUAL.length)))];
+    context.fillRect(Math.round(list[3 * i]), Math.round(list[3 * i + 1]), 1, 1);
   }
   root.dataset.pictures = 1 + Number(root.dataset.pictures ?? 0);
 }

@@ -6,7 +6,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <cinttypes>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -195,12 +194,11 @@ void scan_text(benchmark::State& state, const std::string& path) {
     if (!lines) std::abort();
     std::string_view view;
     std::string line;
-    std::int64_t t = 0;
+    double t = 0;
     int x = 0, y = 0, p = 0;
     while (*lines->next(view)) {
       line = view;
-      const int fields =
-          std::sscanf(line.c_str(), "%" SCNd64 " %d %d %d", &t, &x, &y, &p);  // NOLINT(cert-err34-c)
+      const int fields = std::sscanf(line.c_str(), "%lf %d %d %d", &t, &x, &y, &p);  // NOLINT(cert-err34-c)
       events += fields == 4 ? 1 : 0;
       benchmark::DoNotOptimize(t);
     }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "evpose/registration/temporal_field.h"
 #include "evpose/view/pages.h"
 
 namespace evpose {
@@ -152,6 +153,17 @@ void Viewer::draw(const Tracker& tracker, const Update& u) {
   server_->publish({std::make_shared<std::string>(picture_of(tracker, u.t, to_seconds(u.t - first_))), true});
 }
 
+namespace {
+
+/// Of the paper's field at a projected point: 0 where an event has just been, 1 where none was for long.
+float residual_at(const TimeSurface& surface, const Tracker::Snapshot::Point& p, std::uint32_t now_us) {
+  const Eigen::Vector2d pixel(static_cast<double>(p.x), static_cast<double>(p.y));
+  return static_cast<float>(
+      1 - sample_field(surface, pixel, now_us, 1e6 * kDecay_s, FieldKernel::bilinear).value);
+}
+
+}  // namespace
+
 std::string picture_of(const Tracker& tracker, TimeNs t, double t_s) {
   const TimeSurface& surface = tracker.events().surface();
   const std::uint32_t now_us = tracker.events().stamp(t);
@@ -185,7 +197,8 @@ std::string picture_of(const Tracker& tracker, TimeNs t, double t_s) {
     }
   while (out.size() % 4 != 0) out += '\0';
   for (const auto& p : points)
-    put(p.x / static_cast<float>(step)), put(p.y / static_cast<float>(step)), put(p.matched ? 1.0f : 0.0f);
+    put(p.x / static_cast<float>(step)), put(p.y / static_cast<float>(step)),
+        put(residual_at(surface, p, now_us));
   return out;
 }
 

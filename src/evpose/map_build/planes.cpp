@@ -11,6 +11,7 @@ namespace evpose::map_build {
 namespace {
 
 constexpr double kFewestPoints = 40;  // of a plane, however small the patches
+constexpr double kInnerShare = 0.2;   // of a plane's points, that lie away from other planes
 constexpr double kBendNoise = 1.2;    // rms distance from the planes beside it, in units of the noise
 
 /// Sums of a region's points.
@@ -63,6 +64,8 @@ class Growing {
   void dissolve_bends();
   void merge_flush();
   void adopt_bends();
+  void share_out();
+  void refit();
   Planes result();
 
  private:
@@ -250,6 +253,43 @@ void Growing::merge_flush() {
   moments_ = std::move(kept);
 }
 
+/// Points beside a bend go to the nearer plane, whichever grew first.
+void Growing::share_out() {
+  std::vector<Fit> planes;
+  for (const Moments& m : moments_) planes.push_back(fit(m));
+  std::vector<std::int32_t> nearest = label_;
+  for (std::uint32_t i = 0; i < label_.size(); ++i) {
+    if (label_[i] < 0) continue;
+    double least = std::abs(planes[static_cast<std::size_t>(label_[i])].distance(at(i)));
+    for (int k = 0; k < SurfacePoints::kLinks; ++k) {
+      const std::int32_t other = label_[links(i)[k]];
+      if (other < 0 || other == nearest[i]) continue;
+      const double distance = std::abs(planes[static_cast<std::size_t>(other)].distance(at(i)));
+      if (distance < least) least = distance, nearest[i] = other;
+    }
+  }
+  label_ = std::move(nearest);
+}
+
+/// Planes through the points that have only points of the same plane around them. Beside a bend the noise
+/// mixes the points of two faces, and faces of a pillar would lean by a degree.
+void Growing::refit() {
+  std::vector<Moments> all(moments_.size()), inner(moments_.size());
+  for (std::uint32_t i = 0; i < label_.size(); ++i) {
+    if (label_[i] < 0) continue;
+    const auto own = static_cast<std::size_t>(label_[i]);
+    all[own].add(at(i));
+    const std::uint32_t* near = links(i);
+    if (std::all_of(near, near + SurfacePoints::kLinks,
+                    [&](std::uint32_t q) { return label_[q] == label_[i]; }))
+      inner[own].add(at(i));
+  }
+  for (std::size_t p = 0; p < moments_.size(); ++p) {
+    const bool enough = inner[p].count >= std::max(kFewestPoints, kInnerShare * all[p].count);
+    if (enough) moments_[p] = inner[p];
+  }
+}
+
 Planes Growing::result() {
   Planes out;
   out.label = label_;
@@ -322,6 +362,11 @@ Planes find_planes(const SurfacePoints& surface, const PlaneConfig& config) {
   growing.dissolve_bends();
   growing.merge_flush();
   growing.adopt_bends();
+  for (int round = 0; round < 3; ++round) {
+    growing.refit();
+    growing.share_out();
+  }
+  growing.refit();
   return growing.result();
 }
 

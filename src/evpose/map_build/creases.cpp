@@ -11,6 +11,8 @@
 #include <set>
 
 #include "evpose/core/parallel.h"
+#include "evpose/map_build/neighbours.h"
+#include "evpose/map_build/strips.h"
 
 namespace evpose::map_build {
 namespace {
@@ -18,8 +20,6 @@ namespace {
 constexpr double kBinSpacings = 2.5;    // length and depth of a bin of support, in point spacings
 constexpr double kCovered = 0.35;       // least share of a bin that its points stand for
 constexpr double kAmbiguous = 1.5;      // noise: so near to the line a point may be of either plane
-constexpr double kSpeaksAgainst = 3;    // sigma
-constexpr double kUneven = 0.1;         // noise: so far a surface may leave its plane near the line
 constexpr double kFacetSin = 0.87;      // of the angle between facets of a column, pipe or vault, at most
 constexpr double kFacetWidth_m = 0.25;  // of such facets, at most
 constexpr int kLargestGap = 2;          // bins without support that a piece bridges
@@ -80,11 +80,10 @@ struct Support {
   }
 };
 
-/// Points of a plane near a line: places along it, distances from it within the plane, heights over the
-/// plane, spacings.
+/// Points of a plane near a line: places along it, distances from it within the plane, spacings.
 struct NearLine {
   std::vector<Eigen::Vector2d> place;
-  std::vector<double> height, spacing;
+  std::vector<double> spacing;
 };
 
 NearLine near_line(const SurfacePoints& surface, const FittedPlane& plane, const Line& line, double reach_m) {
@@ -96,81 +95,8 @@ NearLine near_line(const SurfacePoints& surface, const FittedPlane& plane, const
     const float d = across.dot(x);
     if (std::abs(d) > static_cast<float>(reach_m)) continue;
     out.place.emplace_back(line.direction.dot(x.cast<double>()), static_cast<double>(d));
-    out.height.push_back(plane.distance(surface.position[i].cast<double>()));
     out.spacing.push_back(static_cast<double>(surface.spacing_m[i]));
   }
-  return out;
-}
-
-/// How a surface runs beside a line, relative to its plane: height = offset + slope (t - middle).
-struct Strip {
-  double offset = 0, slope = 0;
-  double sigma = 0;  ///< of the height, with what is left of the chunks' scatter
-};
-
-struct StripRange {
-  double t0, t1, d0, d1;  ///< along and across the line
-  int side;               ///< 1: above it, 0: below
-};
-
-/// Weighted fit to the mean heights of chunks along the line; the plane itself is the prior, as good as
-/// `prior_m`. What the chunks scatter beyond their noise is unevenness of the surface, and enters sigma.
-Strip fit_strip(const NearLine& near, const StripRange& range, double noise_m, double prior_m) {
-  constexpr int kChunkPoints = 12, kMostChunks = 64;
-  std::vector<std::pair<double, double>> inside;
-  for (std::size_t k = 0; k < near.place.size(); ++k) {
-    const double t = near.place[k].x(), d = near.place[k].y() * (range.side == 1 ? 1 : -1);
-    if (t >= range.t0 && t <= range.t1 && d >= range.d0 && d <= range.d1)
-      inside.emplace_back(t, near.height[k]);
-  }
-  Strip out;
-  out.sigma = prior_m;
-  const int chunks = std::clamp(static_cast<int>(inside.size()) / kChunkPoints, 1, kMostChunks);
-  std::vector<double> sum(static_cast<std::size_t>(chunks), 0), count(sum), place(sum);
-  const double length = range.t1 - range.t0, middle = 0.5 * (range.t0 + range.t1);
-  for (const auto& [t, height] : inside) {
-    const auto j = static_cast<std::size_t>(
-        std::clamp(static_cast<int>((t - range.t0) / length * chunks), 0, chunks - 1));
-    sum[j] += height, place[j] += t - middle, count[j] += 1;
-  }
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d right = Eigen::Vector2d::Zero();
-  for (std::size_t j = 0; j < sum.size(); ++j) {
-    if (count[j] < 3) continue;
-    const Eigen::Vector2d row(1, place[j] / count[j]);
-    const double weight = count[j] / (noise_m * noise_m);
-    information += weight * row * row.transpose();
-    right += weight * (sum[j] / count[j]) * row;
-  }
-  if (!(information(0, 0) > 0)) return out;
-  // The plane itself, known from all of its points, unless the strip speaks against it.
-  Eigen::Vector2d fitted = Eigen::Vector2d::Zero();
-  double variance = prior_m * prior_m;
-  const double offset = right[0] / information(0, 0), offset_variance = 1 / information(0, 0);
-  if (offset * offset > kSpeaksAgainst * kSpeaksAgainst * (offset_variance + variance)) {
-    fitted[0] = offset;
-    variance = offset_variance;
-  }
-  if (const double determinant = information.determinant();
-      determinant > 1e-3 * information(0, 0) * information(1, 1)) {
-    const Eigen::Vector2d line = information.inverse() * right;
-    const double slope_variance = information(0, 0) / determinant;
-    if (line[1] * line[1] > kSpeaksAgainst * kSpeaksAgainst * slope_variance) {
-      fitted = line;
-      variance = information(1, 1) / determinant + slope_variance * length * length / 12;
-    }
-  }
-  out.offset = fitted[0];
-  out.slope = fitted[1];
-  double scatter = 0, expected = 0, used = 0;
-  for (std::size_t j = 0; j < sum.size(); ++j) {
-    if (count[j] < 3) continue;
-    scatter += std::pow(sum[j] / count[j] - fitted[0] - fitted[1] * place[j] / count[j], 2);
-    expected += noise_m * noise_m / count[j];
-    used += 1;
-  }
-  const double uneven = used > 2 ? std::max(scatter - expected * (used - 2) / used, 0.0) / (used - 2) : 0;
-  out.sigma = std::sqrt(variance + uneven);
   return out;
 }
 
@@ -198,8 +124,9 @@ double width_across(const SurfacePoints& surface, const FittedPlane& plane, cons
 
 class CreaseFinder {
  public:
-  CreaseFinder(const SurfacePoints& surface, const Planes& planes, const CreaseConfig& config)
-      : surface_(surface), planes_(planes), config_(config) {}
+  CreaseFinder(const SurfacePoints& surface, const Neighbours& tree, const Planes& planes,
+               const CreaseConfig& config)
+      : surface_(surface), tree_(tree), planes_(planes), config_(config) {}
 
   std::vector<Piece> pieces_of(const PlanePair& pair, const Contact& contact,
                                const std::vector<std::int32_t>& thirds) const;
@@ -208,13 +135,8 @@ class CreaseFinder {
   double snapped(const Line& line, double t, double reach_m, const PlanePair& pair,
                  const std::vector<std::int32_t>& thirds) const;
 
-  Strip strip_of(const NearLine& near, double t0, double t1, bool above, double gap_m, double bin_m,
-                 const FittedPlane& plane) const {
-    const double prior = std::hypot(plane.sigma_at(plane.centre), kUneven * surface_.scale.noise_m);
-    return fit_strip(near, {t0, t1, gap_m, gap_m + 1.5 * bin_m, above ? 1 : 0}, plane.rms_m, prior);
-  }
-
   const SurfacePoints& surface_;
+  const Neighbours& tree_;
   const Planes& planes_;
   const CreaseConfig& config_;
 };
@@ -275,8 +197,16 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
     t0 = snapped(line, t0, reach_m, pair, thirds);
     t1 = snapped(line, t1, reach_m, pair, thirds);
     if (t1 - t0 < config_.least_length_m) continue;
-    const Strip strip_a = strip_of(near_a, t0, t1, sides_a > 0, gap_m, bin_m, a);
-    const Strip strip_b = strip_of(near_b, t0, t1, sides_b > 0, gap_m, bin_m, b);
+    // The surface lies on the side of its points: out of it points the other.
+    const Eigen::Vector3d out_a = line.direction.cross(a.normal) * (sides_a > 0 ? -1 : 1);
+    const Eigen::Vector3d out_b = line.direction.cross(b.normal) * (sides_b > 0 ? -1 : 1);
+    const Eigen::Vector3d begin = line.origin + t0 * line.direction, end = line.origin + t1 * line.direction;
+    const std::vector<Eigen::Vector3d> around = points_around(
+        surface_, tree_, begin, end, strip_reach_m(surface_.scale.noise_m, sine, spacing[spacing.size() / 2]));
+    const StripFit strip_a =
+        fit_strip(around, {begin, end, -out_a, a, b, sine, spacing[spacing.size() / 2]}, surface_.scale.noise_m);
+    const StripFit strip_b =
+        fit_strip(around, {begin, end, -out_b, b, a, sine, spacing[spacing.size() / 2]}, surface_.scale.noise_m);
     Piece piece;
     piece.kind = ContourKind::crease;
     piece.plane_a = pair.first;
@@ -287,15 +217,14 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
     const Eigen::Matrix3d solve = rows.inverse();
     const auto moved = [&](double t, double from_middle) -> Eigen::Vector3d {
       return line.origin + t * line.direction +
-             solve * Eigen::Vector3d(strip_a.offset + strip_a.slope * from_middle,
-                                     strip_b.offset + strip_b.slope * from_middle, 0);
+             solve * Eigen::Vector3d(strip_a.offset_m + strip_a.slope * from_middle,
+                                     strip_b.offset_m + strip_b.slope * from_middle, 0);
     };
     piece.begin = moved(t0, 0.5 * (t0 - t1));
     piece.end = moved(t1, 0.5 * (t1 - t0));
-    // The surface lies on the side of its points: out of it points the other.
-    piece.normal_a = line.direction.cross(a.normal) * (sides_a > 0 ? -1 : 1);
-    piece.normal_b = line.direction.cross(b.normal) * (sides_b > 0 ? -1 : 1);
-    piece.sigma_m = std::hypot(strip_a.sigma, strip_b.sigma) / (std::sqrt(2.0) * sine);
+    piece.normal_a = out_a;
+    piece.normal_b = out_b;
+    piece.sigma_m = std::hypot(strip_a.sigma_m, strip_b.sigma_m) / (std::sqrt(2.0) * sine);
     if (piece.sigma_m > config_.most_sigma_m) continue;
     out.push_back(piece);
   }
@@ -304,7 +233,7 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
 
 }  // namespace
 
-std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& planes,
+std::vector<Piece> find_creases(const SurfacePoints& surface, const Neighbours& tree, const Planes& planes,
                                 const std::vector<bool>& unfit, const CreaseConfig& config,
                                 ThreadPool& pool) {
   const auto contacts = find_contacts(surface, planes);
@@ -320,7 +249,7 @@ std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& plan
     if (a.normal.cross(b.normal).norm() < std::sin(config.least_angle_rad)) continue;
     candidates.emplace_back(pair, contact);
   }
-  const CreaseFinder finder(surface, planes, config);
+  const CreaseFinder finder(surface, tree, planes, config);
   std::vector<std::vector<Piece>> found(candidates.size());
   pool.for_chunks(candidates.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {

@@ -12,6 +12,8 @@ class ThreadPool;
 
 namespace evpose::map_build {
 
+class Neighbours;
+
 struct CreaseConfig {
   double least_angle_rad = 0.35;  ///< between two planes that make a crease
   double least_length_m = 0.08;   ///< of a piece
@@ -22,7 +24,7 @@ struct CreaseConfig {
 /// Near the line each plane is fitted again to the points beside it: walls carry skirtings, floors sag, scans
 /// are registered to a centimetre. Ends near a third plane that touches one of the two go to the point where
 /// the three meet. Planes that are `unfit` make none.
-std::vector<Piece> find_creases(const SurfacePoints& surface, const Planes& planes,
+std::vector<Piece> find_creases(const SurfacePoints& surface, const Neighbours& tree, const Planes& planes,
                                 const std::vector<bool>& unfit, const CreaseConfig& config, ThreadPool& pool);
 
 /// For each plane whether its points bend like a cylinder, by more than the noise and over an angle that

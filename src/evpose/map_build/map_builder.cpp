@@ -158,9 +158,9 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   std::vector<bool> unfit = curved;  // for contours: bent, or a mixture of surfaces
   const double roughest_m = config.plane.most_rough * typical_roughness(planes);
   for (std::size_t p = 0; p < unfit.size(); ++p) unfit[p] = unfit[p] || planes.planes[p].rms_m > roughest_m;
-  const std::vector<Piece> creases = find_creases(surface, planes, unfit, config.crease, pool);
-  if (!progress(0.85)) return kGivenUp;
   const Neighbours tree(surface.position);
+  const std::vector<Piece> creases = find_creases(surface, tree, planes, unfit, config.crease, pool);
+  if (!progress(0.85)) return kGivenUp;
   std::vector<std::vector<Piece>> pieces(planes.planes.size());
   for (const Piece& piece : creases)
     for (const std::int32_t plane : {piece.plane_a, piece.plane_b})

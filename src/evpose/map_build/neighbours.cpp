@@ -35,4 +35,13 @@ std::size_t Neighbours::nearest(const Eigen::Vector3f& p, std::span<std::uint32_
   return tree_->index.knnSearch(p.data(), indices.size(), indices.data(), squares.data());
 }
 
+void Neighbours::within(const Eigen::Vector3f& p, float radius_m, std::vector<std::uint32_t>& out) const {
+  nanoflann::SearchParams unsorted;
+  unsorted.sorted = false;
+  std::vector<std::pair<std::uint32_t, float>> found;
+  tree_->index.radiusSearch(p.data(), radius_m * radius_m, found, unsorted);
+  out.clear();
+  for (const auto& [index, square] : found) out.push_back(index);
+}
+
 }  // namespace evpose::map_build

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "evpose/map_build/planes.h"
+
+namespace evpose::map_build {
+
+class Neighbours;
+
+/// All points of the cloud within `reach_m` of a line, whatever plane they are of, relative to the anchor.
+std::vector<Eigen::Vector3d> points_around(const SurfacePoints& surface, const Neighbours& tree,
+                                           const Eigen::Vector3d& begin, const Eigen::Vector3d& end,
+                                           double reach_m);
+
+/// The part of a face beside an edge that tells where the face is there.
+struct StripPlace {
+  Eigen::Vector3d begin, end;  ///< of the edge
+  Eigen::Vector3d inwards;     ///< unit, in the face, across the edge
+  const FittedPlane& plane;    ///< of the face
+  const FittedPlane& other;    ///< of the other face: its points beside the edge have no part
+  double sine;                 ///< of the angle between the two
+  double spacing_m;            ///< of the points
+};
+
+/// How a surface runs beside an edge, relative to its plane: height = offset + slope (t - middle).
+struct StripFit {
+  double offset_m = 0, slope = 0;
+  double sigma_m = 0;  ///< of the height, with what is left of the scatter along the edge
+};
+
+/// Distance from the edge that fit_strip looks at points within.
+double strip_reach_m(double noise_m, double sine, double spacing_m);
+
+/// Walls carry skirtings, floors sag, scans are registered to a centimetre: a face need not lie in its plane
+/// where the edge is. The height at which the points beside the edge lie is sought in a window around itself,
+/// so that neither the plane's gate nor layers behind draw it. The result is the mean over two cases, that the
+/// face is in its plane and that it is anywhere near, weighed by how well each explains the height; both
+/// cases' spread is in sigma.
+StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace& place, double noise_m);
+
+}  // namespace evpose::map_build

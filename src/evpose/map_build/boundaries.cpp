@@ -4,13 +4,32 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+
+#include "evpose/map_build/strips.h"
 
 namespace evpose::map_build {
 namespace {
 
 constexpr double kMovedByBlur = 0.3;
+constexpr double kWindow = 2.5;           // noise: half width of what is taken for one surface
+constexpr double kReachNoise = 4;         // noise: of what is looked at around an edge
+constexpr double kMixed = 1.5;            // noise: nearer to the plane points may be of either face
+constexpr double kBand_m = 0.03;          // height of the band in which a second face is looked for, at least
+constexpr double kBandSpacings = 2;       // ... and in spacings
+constexpr double kFewestHanging = 8;      // points of a second face
+constexpr double kLeastHanging = 0.3;     // ... and its density, as a share of the plane's
+constexpr double kMostBeside = 0.4;       // points beside the second face, as a share of its own
+constexpr double kAgree = 2.5;            // sigma: two estimates of one edge
+constexpr double kAgreeBlur = 0.5;        // ... and blur of the softer one
+constexpr double kHigh = 1.2;             // noise: few of the plane's points are further from it
+constexpr double kExcess = 3;             // sigma: of points at the edge over chance
+constexpr std::size_t kMostPoints = 1200; // for one edge
+constexpr double kUneven = 0.1;           // noise: that many points do not average away
+constexpr double kMostRest = 0.12;        // density beyond a free edge, as a share of that within
+constexpr double kMostRestHanging = 0.35; // ... beyond an edge with a second face
 
 double density_of(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
 double share_above(double x) { return 0.5 * std::erfc(x / std::numbers::sqrt2); }
@@ -22,13 +41,24 @@ struct Step {
   }
 };
 
-/// Log likelihood but for constants; the integral of the density over the strip in closed form for a small
-/// slope, whose first order cancels.
+/// Width of the strip |d| <= half_width that the step fills, and its derivative in the place. In closed form
+/// for a small slope, whose first order cancels.
+double filled(const Step& step, double half_width) {
+  const auto antiderivative = [](double x) { return x * share_above(-x) + density_of(x); };
+  return step.blur * (antiderivative((step.place + half_width) / step.blur) -
+                      antiderivative((step.place - half_width) / step.blur));
+}
+double filled_slope(const Step& step, double half_width) {
+  return share_above(-(step.place + half_width) / step.blur) -
+         share_above(-(step.place - half_width) / step.blur);
+}
+
+/// Log likelihood but for constants.
 double log_likelihood(std::span<const Eigen::Vector2d> points, const Step& step, double half_length,
                       double half_width) {
   double sum = 0;
   for (const auto& p : points) sum += std::log(step.at(p.x(), p.y()));
-  return sum - 2 * half_length * (step.inside * (step.place + half_width) + step.outside * 2 * half_width);
+  return sum - 2 * half_length * (step.inside * filled(step, half_width) + step.outside * 2 * half_width);
 }
 
 }  // namespace
@@ -59,8 +89,8 @@ StepFit fit_step(std::span<const Eigen::Vector2d> points, double half_length, do
   double likelihood = log_likelihood(points, step, half_length, half_width);
   for (int round = 0; round < kMostRounds; ++round) {
     // Fisher scoring in place, slope and inner density (relative); the rest by expectation.
-    Eigen::Vector3d gradient(-2 * half_length * step.inside, 0,
-                             -2 * half_length * (step.place + half_width) * step.inside);
+    Eigen::Vector3d gradient(-2 * half_length * step.inside * filled_slope(step, half_width), 0,
+                             -2 * half_length * step.inside * filled(step, half_width));
     information.setZero();
     double beyond = 0;
     for (const auto& p : points) {
@@ -105,6 +135,8 @@ StepFit fit_step(std::span<const Eigen::Vector2d> points, double half_length, do
   out.sigma_place = std::sqrt(covariance(0, 0));
   out.sigma_slope = std::sqrt(covariance(1, 1));
   out.rest = step.outside / step.inside;
+  out.density = step.inside;
+  out.log_likelihood = likelihood;
   return out;
 }
 
@@ -123,20 +155,27 @@ class BoundaryFinder {
         outline_(outline),
         creases_(creases),
         config_(config) {
-    for (const std::uint32_t i : plane.points) add_point(surface.position[i].cast<double>());
     free_side_ = side_of_the_rest(surface, plane);
   }
 
   Boundaries find(std::int32_t number) const;
 
  private:
-  void add_point(const Eigen::Vector3d& x) {
-    flat_.push_back(frame_.flat(x));
-    height_.push_back(plane_.distance(x));
-  }
-  std::vector<Eigen::Vector2d> own_points(const Eigen::Vector2d& middle, const Eigen::Vector2d& along,
-                                          const Eigen::Vector2d& out, double half_length,
-                                          double half_width) const;
+  struct Edge {
+    Eigen::Vector2d middle, along, out;  ///< in the plane's frame
+    double half_length;
+  };
+  std::vector<Eigen::Vector3d> local_points(const Edge& edge, double reach) const;
+  struct OwnPoints {
+    std::vector<Eigen::Vector3d> points;  ///< along, outwards, over the plane
+    bool one_side = false;                ///< only those on one side of the plane
+    double share = 1;                     ///< of them that was kept
+  };
+  OwnPoints own_points(const std::vector<Eigen::Vector3d>& local, double half_width) const;
+  static StepFit likeliest(const std::vector<Eigen::Vector3d>& points, double half_length, double half_width,
+                           double shear, std::span<const double> blurs);
+  bool hanging(const std::vector<Eigen::Vector3d>& local, double length, double density, int side,
+               double& place, double& sigma) const;
   bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
   bool goes_on(const Piece& piece) const;
   bool covered(const Piece& piece) const;
@@ -149,8 +188,6 @@ class BoundaryFinder {
   const Outline& outline_;
   const std::vector<Piece>& creases_;
   const BoundaryConfig& config_;
-  std::vector<Eigen::Vector2d> flat_;
-  std::vector<double> height_;  ///< of the same points over the plane
   double free_side_ = 0;
 };
 
@@ -227,70 +264,149 @@ double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) 
   return below > kNearlyAll * (above + below) ? -1 : 0;
 }
 
-/// Points of the plane in a strip around an edge, in its coordinates. A face that hangs from the edge lies on
-/// one side of the plane, and its points near the edge pass for the plane's; those on the other side are the
-/// plane's own.
-std::vector<Eigen::Vector2d> BoundaryFinder::own_points(const Eigen::Vector2d& middle,
-                                                        const Eigen::Vector2d& along,
-                                                        const Eigen::Vector2d& out, double half_length,
-                                                        double half_width) const {
-  std::vector<Eigen::Vector2d> all, half[2];
-  double at_edge[2] = {0, 0}, within[2] = {0, 0};
-  for (std::size_t k = 0; k < flat_.size(); ++k) {
-    const Eigen::Vector2d local(along.dot(flat_[k] - middle), out.dot(flat_[k] - middle));
-    if (std::abs(local.x()) > half_length || std::abs(local.y()) > half_width) continue;
-    const int side = height_[k] > 0 ? 1 : 0;
-    all.push_back(local);
-    half[side].push_back(local);
-    (local.y() > -surface_.scale.noise_m ? at_edge : within)[side] += 1;
+/// All points of the cloud near an edge in its coordinates: along it, outwards, over the plane.
+std::vector<Eigen::Vector3d> BoundaryFinder::local_points(const Edge& edge, double reach) const {
+  const Eigen::Vector3d begin = frame_.lift(edge.middle - edge.half_length * edge.along);
+  const Eigen::Vector3d end = frame_.lift(edge.middle + edge.half_length * edge.along);
+  std::vector<Eigen::Vector3d> out = points_around(surface_, tree_, begin, end, reach);
+  for (Eigen::Vector3d& x : out) {
+    const Eigen::Vector2d flat = frame_.flat(x) - edge.middle;
+    x = {edge.along.dot(flat), edge.out.dot(flat), plane_.distance(x)};
   }
-  // Both halves, unless one has more at the edge than chance gives it beside the other.
+  return out;
+}
+
+/// Points of the plane beside an edge. A narrow face that hangs from the edge lies on one side of the plane,
+/// and its points near the edge pass for the plane's; those on the other side are the plane's own. Told from
+/// the points too high for most of the plane's: they stand at the edge in excess, on that side only.
+BoundaryFinder::OwnPoints BoundaryFinder::own_points(const std::vector<Eigen::Vector3d>& local,
+                                                     double half_width) const {
+  const double noise = surface_.scale.noise_m;
+  OwnPoints out;
+  std::vector<Eigen::Vector3d> half[2];
+  double at_edge[2] = {0, 0}, within[2] = {0, 0};
+  for (const auto& p : local) {
+    if (std::abs(p.z()) > kWindow * noise || std::abs(p.y()) > half_width) continue;
+    const int side = p.z() > 0 ? 1 : 0;
+    out.points.push_back(p);
+    half[side].push_back(p);
+    if (std::abs(p.z()) > kHigh * noise) (p.y() > -kWindow * noise ? at_edge : within)[side] += 1;
+  }
   const double expected = within[0] + within[1] > 0 ? within[1] / (within[0] + within[1]) : 0.5;
   const double edge = at_edge[0] + at_edge[1];
   const double sigma = std::sqrt(std::max(edge * expected * (1 - expected), 1.0));
   const double excess = at_edge[1] - edge * expected;
-  if (std::abs(excess) < 2 * sigma) return all;
-  return half[excess > 0 ? 0 : 1];
+  if (std::abs(excess) > kExcess * sigma) {
+    out.points = std::move(half[excess > 0 ? 0 : 1]);
+    out.one_side = true;
+  }
+  if (out.points.size() > kMostPoints) {
+    const std::size_t step = out.points.size() / kMostPoints + 1;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < out.points.size(); k += step) out.points[kept++] = out.points[k];
+    out.points.resize(kept);
+    out.share = 1.0 / static_cast<double>(step);
+  }
+  return out;
+}
+
+/// The likeliest step for some softnesses; seen askew, noise along the ray shifts points outwards as it lifts
+/// them: `shear` is metres outwards per metre of height.
+StepFit BoundaryFinder::likeliest(const std::vector<Eigen::Vector3d>& points, double half_length,
+                                  double half_width, double shear, std::span<const double> blurs) {
+  std::vector<Eigen::Vector2d> flat;
+  flat.reserve(points.size());
+  for (const auto& p : points) flat.emplace_back(p.x(), p.y() - shear * p.z());
+  StepFit best;
+  best.log_likelihood = -INFINITY;
+  for (const double blur : blurs) {
+    const StepFit step = fit_step(flat, half_length, half_width, blur);
+    if (step.converged && step.log_likelihood > best.log_likelihood) best = step;
+  }
+  return best;
+}
+
+/// The face that begins at the edge on one side of the plane, +1 or -1: where it stands across the edge.
+bool BoundaryFinder::hanging(const std::vector<Eigen::Vector3d>& local, double length, double density,
+                             int side, double& place, double& sigma) const {
+  const double noise = surface_.scale.noise_m;
+  const double low = kMixed * noise, high = low + std::max(kBand_m, kBandSpacings * plane_.spacing_m);
+  const double window = kWindow * noise;
+  double mean = 0, count = 0, squares = 0, beside = 0;
+  for (int round = 0; round < 8; ++round) {
+    double sum = 0;
+    count = squares = beside = 0;
+    for (const auto& p : local) {
+      const double height = side * p.z(), d = p.y() - mean;
+      if (height < low || height > high) continue;
+      if (std::abs(d) <= window)
+        sum += p.y(), squares += d * d, count += 1;
+      else if (std::abs(d) <= 2 * window)
+        beside += 1;
+    }
+    if (count == 0) return false;
+    mean = sum / count;
+  }
+  if (count < kFewestHanging || count < kLeastHanging * density * length * (high - low)) return false;
+  if (beside > kMostBeside * count || std::abs(mean) > window) return false;
+  place = mean;
+  sigma = std::hypot(std::sqrt(squares) / count, kUneven * noise);
+  return true;
 }
 
 bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const {
-  Eigen::Vector2d along = (b - a).normalized(), out(along.y(), -along.x());  // the surface is on the left
-  Eigen::Vector2d middle = 0.5 * (a + b);
-  const double half_length = 0.5 * (b - a).norm();
-  const double half_width = 2.5 * outline_.cell_m;
+  Edge edge;
+  edge.along = (b - a).normalized();
+  edge.out = {edge.along.y(), -edge.along.x()};  // the surface is on the left
+  edge.middle = 0.5 * (a + b);
+  edge.half_length = 0.5 * (b - a).norm();
+  const double noise = surface_.scale.noise_m, half_width = 2.5 * outline_.cell_m;
+  const double softest = std::max(noise, 0.3 * plane_.spacing_m);
   StepFit best;
+  double share = 1;
   for (int round = 0; round < 2; ++round) {
-    const std::vector<Eigen::Vector2d> strip = own_points(middle, along, out, half_length, half_width);
+    const OwnPoints own =
+        own_points(local_points(edge, std::hypot(half_width, kReachNoise * noise)), half_width);
+    share = own.share;
     // The softness of the edge: that which makes the points likeliest.
-    double likeliest = -INFINITY;
-    best = StepFit();
-    for (const double factor : {0.25, 0.5, 1.0, 2.0, 4.0}) {
-      const double blur = factor * std::max(surface_.scale.noise_m, 0.3 * plane_.spacing_m);
-      const StepFit step = fit_step(strip, half_length, half_width, blur);
-      if (!step.converged) continue;
-      double inside = 0;
-      for (const auto& p : strip) inside += p.y() < step.place ? 1 : 0;
-      const double density = inside / (2 * half_length * (step.place + half_width));
-      const double likelihood =
-          log_likelihood(strip, {step.place, step.slope, blur, density, std::max(step.rest, 1e-4) * density},
-                         half_length, half_width);
-      if (likelihood > likeliest) likeliest = likelihood, best = step;
-    }
+    const std::array<double, 5> blurs = {0.25 * softest, 0.5 * softest, softest, 2 * softest, 4 * softest};
+    best = likeliest(own.points, edge.half_length, half_width, 0, blurs);
     if (!best.converged) return false;
-    middle += best.place * out;
-    along = (along + best.slope * out).normalized();
-    out = {along.y(), -along.x()};
+    if (round == 1 && !own.one_side)
+      for (const double shear : {-1.0, -0.5, 0.5, 1.0}) {
+        const std::array<double, 2> sharper = {best.blur_m, 0.6 * best.blur_m};
+        const StepFit step = likeliest(own.points, edge.half_length, half_width, shear, sharper);
+        if (step.converged && step.log_likelihood > best.log_likelihood) best = step;
+      }
+    edge.middle += best.place * edge.out;
+    edge.along = (edge.along + best.slope * edge.out).normalized();
+    edge.out = {edge.along.y(), -edge.along.x()};
   }
-  const double soft = config_.most_blur_noise * std::max(surface_.scale.noise_m, 0.3 * plane_.spacing_m);
-  if (best.blur_m > soft || best.rest > 0.25) return false;
-  piece.kind = ContourKind::boundary;
-  piece.begin = frame_.lift(middle - half_length * along);
-  piece.end = frame_.lift(middle + half_length * along);
-  piece.normal_a = out.x() * frame_.first + out.y() * frame_.second;
-  const double across = std::hypot(best.sigma_place, 0.5 * half_length * best.sigma_slope);
-  // What blurs the edge also moves it, by a part of the blur.
-  piece.sigma_m =
-      std::hypot(across, kMovedByBlur * best.blur_m, plane_.sigma_at(0.5 * (piece.begin + piece.end)));
+  if (best.blur_m > config_.most_blur_noise * softest) return false;
+  const std::vector<Eigen::Vector3d> local =
+      local_points(edge, kReachNoise * noise + std::max(kBand_m, kBandSpacings * plane_.spacing_m));
+  const double length = 2 * edge.half_length;
+  double across = std::hypot(best.sigma_place, 0.5 * edge.half_length * best.sigma_slope);
+  int side = 0;
+  for (const int s : {-1, 1}) {
+    double place = 0, sigma = 0;
+    if (side != 0 || !hanging(local, length, best.density / share, s, place, sigma)) continue;
+    // Where the plane ends the second face must begin.
+    if (std::abs(place) > kAgree * std::hypot(across, sigma) + kAgreeBlur * best.blur_m) return false;
+    side = s;
+    edge.middle += place * edge.out;
+    across = sigma;
+  }
+  if (best.rest > (side != 0 ? kMostRestHanging : kMostRest)) return false;
+  piece.kind = side != 0 ? ContourKind::crease : ContourKind::boundary;
+  piece.begin = frame_.lift(edge.middle - edge.half_length * edge.along);
+  piece.end = frame_.lift(edge.middle + edge.half_length * edge.along);
+  piece.normal_a = edge.out.x() * frame_.first + edge.out.y() * frame_.second;
+  if (side != 0) piece.normal_b = -side * plane_.normal;
+  // What blurs a free edge also moves it, by a part of the blur.
+  const double moved = side != 0 ? 0 : kMovedByBlur * best.blur_m;
+  const double off = plane_.sigma_at(0.5 * (piece.begin + piece.end));
+  piece.sigma_m = std::sqrt((across * across + moved * moved + off * off) / 2);
   return across <= config_.most_sigma_m;
 }
 
@@ -298,8 +414,8 @@ Boundaries BoundaryFinder::find(std::int32_t number) const {
   Boundaries out;
   for (const Ring& ring : outline_.rings) {
     std::vector<Piece> pieces;
-    for (std::size_t k = 0; k < ring.corners.size(); ++k) {
-      const Eigen::Vector2d &a = ring.corners[k], &b = ring.corners[(k + 1) % ring.corners.size()];
+    for (std::size_t k = 0; k < ring.coarse.size(); ++k) {
+      const Eigen::Vector2d &a = ring.coarse[k], &b = ring.coarse[(k + 1) % ring.coarse.size()];
       const double length = (b - a).norm();
       if (explained(a, b)) continue;
       Piece piece;

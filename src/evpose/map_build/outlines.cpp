@@ -231,6 +231,7 @@ Outline trace_outline(const SurfacePoints& surface, const FittedPlane& plane) {
       ring.push_back(low + out.cell_m * (corner.cast<double>() - Eigen::Vector2d(2, 2)));
     Ring traced;
     traced.corners = straightened(ring, 0.8 * out.cell_m);
+    traced.coarse = straightened(ring, 1.5 * out.cell_m);
     if (traced.corners.size() < 3) continue;
     (twice_area(traced.corners) > 0 ? out.rings : holes).push_back(std::move(traced));
   }

@@ -22,6 +22,7 @@ struct PlaneFrame {
 /// A closed line around a plane's points or around a hole in them; the surface is on its left.
 struct Ring {
   std::vector<Eigen::Vector2d> corners;  ///< not repeated at the end
+  std::vector<Eigen::Vector2d> coarse;   ///< the same line with fewer corners: sides long enough to be fitted
   int hole_of = -1;                      ///< ring of the same outline that it cuts, -1: outer
 };
 

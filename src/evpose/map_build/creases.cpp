@@ -265,6 +265,25 @@ std::vector<Piece> find_creases(const SurfacePoints& surface, const Neighbours& 
   return out;
 }
 
+namespace {
+
+/// Narrow planes that touch at a small angle, as facets of a column do, however few points each has.
+void mark_facets(const SurfacePoints& surface, const Planes& planes, std::vector<bool>& curved) {
+  constexpr double kLeastSin = 0.1, kMostSin = 0.75;
+  constexpr int kFewestContacts = 12;
+  for (const auto& [pair, contact] : find_contacts(surface, planes)) {
+    const auto first = static_cast<std::size_t>(pair.first), second = static_cast<std::size_t>(pair.second);
+    const FittedPlane &a = planes.planes[first], &b = planes.planes[second];
+    const double sine = a.normal.cross(b.normal).norm();
+    if (contact.count < kFewestContacts || sine < kLeastSin || sine > kMostSin) continue;
+    const Line line = intersection(a, b, contact.sum / contact.count);
+    if (std::max(width_across(surface, a, line), width_across(surface, b, line)) > kFacetWidth_m) continue;
+    curved[first] = curved[second] = true;
+  }
+}
+
+}  // namespace
+
 std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes) {
   std::vector<bool> out(planes.planes.size(), false);
   for (std::size_t p = 0; p < planes.planes.size(); ++p) {
@@ -300,6 +319,7 @@ std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes
         12 * std::sqrt(5.0) * plane.rms_m / (std::sqrt(static_cast<double>(plane.points.size())) * width);
     out[p] = turn > 0.2 && turn > 4 * sigma_turn;
   }
+  mark_facets(surface, planes, out);
   return out;
 }
 

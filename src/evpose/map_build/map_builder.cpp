@@ -128,6 +128,8 @@ void describe(ConfigTable& table, BuildConfig& c) {
             "least points of a plane, in patches that tell a normal", {1, 1e6});
   table.add("plane_rough", c.plane.most_rough, "",
             "roughest plane that has contours, in units of the typical rms", {1, 100});
+  table.add("plane_tilt", c.plane.most_tilt_rad, "rad", "most error of the direction of a plane with contours",
+            {0.0001, 1});
   table.add("crease_angle", c.crease.least_angle_rad, "rad", "least between two planes that make a crease",
             {0.05, 1.5});
   table.add("crease_length", c.crease.least_length_m, "m", "least of a crease", {0, 10});
@@ -157,7 +159,9 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   const std::vector<bool> curved = find_curved(surface, planes);
   std::vector<bool> unfit = curved;  // for contours: bent, or a mixture of surfaces
   const double roughest_m = config.plane.most_rough * typical_roughness(planes);
-  for (std::size_t p = 0; p < unfit.size(); ++p) unfit[p] = unfit[p] || planes.planes[p].rms_m > roughest_m;
+  for (std::size_t p = 0; p < unfit.size(); ++p)
+    unfit[p] = unfit[p] || planes.planes[p].rms_m > roughest_m ||
+               planes.planes[p].tilt_sigma_rad() > config.plane.most_tilt_rad;
   const Neighbours tree(surface.position);
   const std::vector<Piece> creases = find_creases(surface, tree, planes, unfit, config.crease, pool);
   if (!progress(0.85)) return kGivenUp;

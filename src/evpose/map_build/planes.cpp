@@ -356,6 +356,11 @@ double FittedPlane::sigma_at(const Eigen::Vector3d& x) const {
   return std::sqrt(offset_variance + lever.dot(tilt_covariance * lever));
 }
 
+double FittedPlane::tilt_sigma_rad() const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tilt_covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(solver.eigenvalues()[2], 0.0));
+}
+
 Planes find_planes(const SurfacePoints& surface, const PlaneConfig& config) {
   Growing growing(surface, config);
   growing.grow_all();

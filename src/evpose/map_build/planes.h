@@ -22,6 +22,8 @@ struct FittedPlane {
   std::vector<std::uint32_t> points;  ///< its own, ascending
 
   double distance(const Eigen::Vector3d& x) const { return normal.dot(x) + d; }
+  /// Error of the normal's direction about its worse axis, 1 sigma, from the fit.
+  double tilt_sigma_rad() const;
   /// Error across the plane at x, 1 sigma, from the fit.
   double sigma_at(const Eigen::Vector3d& x) const;
 };
@@ -37,6 +39,7 @@ struct PlaneConfig {
   double least_patches = 1;  ///< points of a plane, in patches that tell a normal
   /// Rms of a plane that has contours, in units of the typical plane's.
   double most_rough = 2;
+  double most_tilt_rad = 0.008;  ///< error of the direction of a plane that has contours, 1 sigma
   double merge_rad = 0.026;  ///< planes that touch and agree to this angle and to the noise become one
 };
 

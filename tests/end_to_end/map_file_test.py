@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The map file as another program reads it, checksums and all. map_file_test.py EVPOSE"""
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
@@ -88,6 +89,137 @@ class MapFileTest(unittest.TestCase):
             ends.append(np.loadtxt(self.root / name / "trajectory.tum"))
         self.assertEqual(ends[0].shape, ends[1].shape)
         self.assertLess(np.abs(ends[0] - ends[1]).max(), 1e-3)
+
+
+def box_cloud(seed=1, noise_m=0.01):
+    """Points of the floor and of a box on it, and the twelve edges that a scan of them tells."""
+    random = np.random.default_rng(seed)
+
+    def face(corner, a, b, per_m2=3000):
+        corner, a, b = map(np.array, (corner, a, b))
+        normal = np.cross(a, b) / np.linalg.norm(np.cross(a, b))
+        n = int(per_m2 * np.linalg.norm(np.cross(a, b)))
+        return corner + random.random((n, 1)) * a + random.random((n, 1)) * b + noise_m * random.normal(size=(n, 1)) * normal
+
+    hull = [face((0, 0, 0), (2., 0, 0), (0, 2., 0)), face((0, 0, 0), (2., 0, 0), (0, 0, 1.5)),
+            face((0, 0, 0), (0, 2., 0), (0, 0, 1.5))]
+    return np.concatenate(hull).astype("<f4")
+
+
+def write_ply(path, points):
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+    header += "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
+    path.write_bytes(header.encode() + points.astype("<f4").tobytes())
+
+
+def write_las(path, points):
+    """LAS 1.2, points of format 0, millimetres."""
+    header = bytearray(227)
+    header[:4] = b"LASF"
+    header[24:26] = bytes([1, 2])
+    struct.pack_into("<H", header, 94, 227)
+    struct.pack_into("<I", header, 96, 227)
+    struct.pack_into("<BHI", header, 104, 0, 20, len(points))
+    struct.pack_into("<6d", header, 131, 1e-4, 1e-4, 1e-4, 0, 0, 0)
+    rows = np.zeros(len(points), dtype=[("xyz", "<i4", 3), ("rest", "u1", 8)])
+    rows["xyz"] = np.round(points.astype(float) * 1e4)
+    path.write_bytes(bytes(header) + rows.tobytes())
+
+
+class MapBuildTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(scratch.cleanup)
+        cls.root = pathlib.Path(scratch.name)
+        cls.points = box_cloud()
+        write_ply(cls.root / "cloud.ply", cls.points)
+        MapFileTest.run_evpose("map", "build", cls.root / "cloud.ply", "-o", cls.root / "map.h5")
+
+    def refused(self, path, *says):
+        result = MapFileTest.run_evpose("-q", "map", "build", path, "-o", self.root / "none.h5", status=2)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        self.assertFalse((self.root / "none.h5").exists())
+        for words in says:
+            self.assertRegex(result.stderr, words)
+
+    def test_five_lines_of_h5py_read_contours_and_planes(self):
+        with h5py.File(self.root / "map.h5") as file:
+            xyz = file["meta"].attrs["anchor"] + file["points/xyz"][:]
+            kind, length = file["contours/kind"][:], file["contours/length"][:]
+            normals, inliers = file["planes/normal"][:], file["planes/inliers"][:]
+        self.assertEqual(len(normals), 3)
+        self.assertGreater(inliers.min(), 5000)
+        # Three creases meet in the corner.
+        self.assertAlmostEqual(length[kind == 1].sum(), 2 + 2 + 1.5, delta=0.2)
+        self.assertLess(np.sort(np.abs(xyz), axis=1)[:, 0].max(), 0.02)
+
+    def test_las_gives_the_map_of_the_same_points(self):
+        points = np.round(self.points.astype(float), 4)
+        write_las(self.root / "cloud.las", points)
+        write_ply(self.root / "rounded.ply", points)
+        maps = []
+        for name in ("cloud.las", "rounded.ply"):
+            MapFileTest.run_evpose("map", "build", self.root / name, "-o", self.root / "las.h5")
+            with h5py.File(self.root / "las.h5") as file:
+                maps.append(file["meta"].attrs["anchor"] + file["points/xyz"][:].astype(float))
+        self.assertEqual(maps[0].shape, maps[1].shape)
+        self.assertLess(np.abs(maps[0] - maps[1]).max(), 1e-3)
+
+    def test_exports_hold_the_contours(self):
+        for name in ("out.ply", "out.obj", "out.svg"):
+            MapFileTest.run_evpose("map", "export", self.root / "map.h5", "-o", self.root / name)
+        with h5py.File(self.root / "map.h5") as file:
+            count, outlines = len(file["points/xyz"]), len(file["polygons/start"])
+        self.assertIn(f"element vertex {count}\n".encode(), (self.root / "out.ply").read_bytes())
+        obj = (self.root / "out.obj").read_text().splitlines()
+        vertices = sum(line.startswith("v ") for line in obj)
+        self.assertGreaterEqual(vertices, 2 * count)
+        for line in obj:
+            if line.startswith("l "):
+                self.assertLessEqual(max(map(int, line.split()[1:])), vertices)
+        self.assertGreaterEqual(sum(line.startswith("l ") for line in obj), count + outlines)
+        self.assertIn("<svg", (self.root / "out.svg").read_text()[:200])
+        self.assertRegex(MapFileTest.run_evpose("map", "export", self.root / "map.h5", "-o", self.root / "out.dxf",
+                                                status=2).stderr, "out.dxf.*ply.*obj.*svg")
+
+    def test_a_map_compared_with_itself_is_without_error(self):
+        table = MapFileTest.run_evpose("map", "compare", self.root / "map.h5", self.root / "map.h5").stdout
+        row = next(line.split() for line in table.splitlines() if line.startswith("all"))
+        self.assertEqual(row[3:7], ["100.0"] * 4)
+        self.assertEqual(row[7], "0.00")
+
+    def test_what_is_no_cloud_is_told_in_one_line(self):
+        bad = self.root / "bad.ply"
+        write_ply(bad, self.points[:0])
+        self.refused(bad, "bad.ply", "no points|points")
+        write_ply(bad, np.outer(np.linspace(0, 1, 500), [1, 2, 3]))
+        self.refused(bad, "lines")
+        write_ply(bad, np.full((500, 3), np.nan))
+        self.refused(bad, "no point is finite")
+        write_ply(bad, np.tile(self.points[:20], (100, 1)))
+        self.refused(bad, "points|lines|flat")
+        write_ply(bad, np.random.default_rng(3).random((400, 3)) * 20)
+        self.refused(bad, "flat|plane|sparse")
+        whole = (self.root / "cloud.ply").read_bytes()
+        bad.write_bytes(whole[:len(whole) // 2])
+        self.refused(bad, "bad.ply", "truncated|bytes")
+        bad.write_bytes(whole.replace(str(len(self.points)).encode(), b"1000000000000", 1))
+        self.refused(bad, "bad.ply", "1000000000000|promises|bytes")
+        pcd = self.root / "bad.pcd"
+        pcd.write_bytes(b"VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 9\nHEIGHT 1\n"
+                        b"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 9\nDATA binary\n" + bytes(30))
+        self.refused(pcd, "bad.pcd", "bytes|truncated")
+
+    def test_centimetres_and_stray_values_are_warned_of(self):
+        stray = np.concatenate([self.points, [[np.nan, 0, 0], [np.inf, 1, 1]], self.points[:50]])
+        write_ply(self.root / "stray.ply", stray)
+        warned = MapFileTest.run_evpose("map", "build", self.root / "stray.ply", "-o", self.root / "stray.h5").stderr
+        self.assertRegex(warned, r"\b2\b.*finite|finite.*\b2\b")
+        write_ply(self.root / "cm.ply", 1000 * self.points)
+        told = subprocess.run([EVPOSE, "map", "build", str(self.root / "cm.ply"), "-o", str(self.root / "cm.h5")],
+                              capture_output=True, text=True, timeout=60).stderr
+        self.assertRegex(told, "metres")
 
 
 if __name__ == "__main__":

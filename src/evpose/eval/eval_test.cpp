@@ -6,8 +6,10 @@
 #include <numbers>
 #include <random>
 
+#include "evpose/eval/map_score.h"
 #include "evpose/eval/measures.h"
 #include "evpose/eval/score.h"
+#include "evpose/map/point_cloud.h"
 
 namespace evpose {
 namespace {
@@ -325,6 +327,49 @@ TEST(Score, RelativeErrorPerMetreOfAScaleErrorIsTheScaleError) {
   EXPECT_NEAR(s.over_1m->translation_mm, 10, 0.2);
   EXPECT_NEAR(s.over_1s->translation_mm, 10, 0.2);  // near the end, spans down to 0.7 s count
   EXPECT_NEAR(s.over_10ms->translation_mm, 0.1, 1e-6);
+}
+
+/// A straight contour along x from `from` to `to`, moved by `off` across it.
+ContourMap straight_contour(double from, double to, double off) {
+  ContourMap map;
+  for (double x = from + 0.005; x < to; x += 0.01) {
+    ContourPoint p;
+    p.position = Eigen::Vector3d(x, off, 0).cast<float>();
+    p.tangent = Eigen::Vector3f::UnitX();
+    p.normal = Eigen::Vector3f::UnitY();
+    p.length = 0.01F;
+    p.sigma = 0.002F;
+    p.kind = ContourKind::crease;
+    map.points.push_back(p);
+  }
+  return map;
+}
+
+TEST(MapScore, AShiftIsTheDistanceAndHalfTheLengthIsHalfTheRecall) {
+  const ContourMap truth = straight_contour(0, 2, 0);
+  const MapScore shifted = score_map(straight_contour(0, 1, 0.004), truth, nullptr, {});
+  EXPECT_NEAR(shifted.all.p50_mm, 4, 1e-3);
+  EXPECT_NEAR(shifted.all.p95_mm, 4, 1e-3);
+  EXPECT_NEAR(shifted.all.precision_5mm, 1, 1e-9);
+  EXPECT_NEAR(shifted.all.recall_5mm, 0.5, 0.02);
+  // 4 mm over 2 mm, in one of the two directions across.
+  EXPECT_NEAR(shifted.all.sigma_ratio, 2 / std::sqrt(2.0), 1e-3);
+  const MapScore further = score_map(straight_contour(0, 2, 0.007), truth, nullptr, {});
+  EXPECT_EQ(further.crease.precision_5mm, 0);
+  EXPECT_NEAR(further.crease.precision_10mm, 1, 1e-9);
+  EXPECT_NEAR(further.crease.recall_10mm, 1, 1e-9);
+  EXPECT_EQ(further.boundary.built_m, 0);
+}
+
+TEST(MapScore, ShortAndUnseenEdgesDoNotCount) {
+  ContourMap truth = straight_contour(0, 2, 0);
+  for (const auto& p : straight_contour(5, 5.2, 0).points) truth.points.push_back(p);
+  PointCloud cloud;
+  for (double x = 0; x < 1; x += 0.004) cloud.points.emplace_back(static_cast<float>(x), 0.01F, 0.0F);
+  const MapScore score = score_map(truth, truth, &cloud, {});
+  EXPECT_NEAR(score.short_m, 0.2, 0.02);
+  EXPECT_NEAR(score.unseen_m, 1, 0.1);
+  EXPECT_NEAR(score.all.recall_5mm, 1, 1e-9);
 }
 
 }  // namespace

@@ -14,22 +14,23 @@ namespace evpose::map_build {
 namespace {
 
 constexpr double kMovedByBlur = 0.3;
-constexpr double kWindow = 2.5;           // noise: half width of what is taken for one surface
-constexpr double kReachNoise = 4;         // noise: of what is looked at around an edge
-constexpr double kMixed = 1.5;            // noise: nearer to the plane points may be of either face
-constexpr double kBand_m = 0.03;          // height of the band in which a second face is looked for, at least
-constexpr double kBandSpacings = 2;       // ... and in spacings
-constexpr double kFewestHanging = 8;      // points of a second face
-constexpr double kLeastHanging = 0.3;     // ... and its density, as a share of the plane's
-constexpr double kMostBeside = 0.4;       // points beside the second face, as a share of its own
-constexpr double kAgree = 2.5;            // sigma: two estimates of one edge
-constexpr double kAgreeBlur = 0.5;        // ... and blur of the softer one
-constexpr double kHigh = 1.2;             // noise: few of the plane's points are further from it
-constexpr double kExcess = 3;             // sigma: of points at the edge over chance
-constexpr std::size_t kMostPoints = 1200; // for one edge
-constexpr double kUneven = 0.1;           // noise: that many points do not average away
-constexpr double kMostRest = 0.12;        // density beyond a free edge, as a share of that within
-constexpr double kMostRestHanging = 0.35; // ... beyond an edge with a second face
+constexpr double kWindow = 2.5;        // noise: half width of what is taken for one surface
+constexpr double kReachNoise = 4;      // noise: of what is looked at around an edge
+constexpr double kMixed = 1.5;         // noise: nearer to the plane points may be of either face
+constexpr double kBand_m = 0.03;       // height of the band in which a second face is looked for, at least
+constexpr double kBandSpacings = 2;    // ... and in spacings
+constexpr double kFewestHanging = 8;   // points of a second face
+constexpr double kLeastHanging = 0.3;  // ... and its density, as a share of the plane's
+constexpr double kMostBeside = 0.4;    // points beside the second face, as a share of its own
+constexpr double kAgree = 2.5;         // sigma: two estimates of one edge
+constexpr double kAgreeBlur = 0.5;     // ... and blur of the softer one
+constexpr double kHigh = 1.2;          // noise: few of the plane's points are further from it
+constexpr double kDenser = 1.5;        // ... and over the plane's density
+constexpr double kExcess = 3;          // sigma: of points at the edge over chance
+constexpr std::size_t kMostPoints = 1200;  // for one edge
+constexpr double kUneven = 0.1;            // noise: that many points do not average away
+constexpr double kMostRest = 0.12;         // density beyond a free edge, as a share of that within
+constexpr double kMostRestHanging = 0.35;  // ... beyond an edge with a second face
 
 double density_of(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
 double share_above(double x) { return 0.5 * std::erfc(x / std::numbers::sqrt2); }
@@ -290,14 +291,19 @@ BoundaryFinder::OwnPoints BoundaryFinder::own_points(const std::vector<Eigen::Ve
     const int side = p.z() > 0 ? 1 : 0;
     out.points.push_back(p);
     half[side].push_back(p);
-    if (std::abs(p.z()) > kHigh * noise) (p.y() > -kWindow * noise ? at_edge : within)[side] += 1;
+    if (std::abs(p.z()) < kHigh * noise || p.y() > kWindow * noise) continue;
+    (p.y() > -kWindow * noise ? at_edge : within)[side] += 1;
   }
   const double expected = within[0] + within[1] > 0 ? within[1] / (within[0] + within[1]) : 0.5;
   const double edge = at_edge[0] + at_edge[1];
   const double sigma = std::sqrt(std::max(edge * expected * (1 - expected), 1.0));
   const double excess = at_edge[1] - edge * expected;
-  if (std::abs(excess) > kExcess * sigma) {
-    out.points = std::move(half[excess > 0 ? 0 : 1]);
+  const int fuller = excess > 0 ? 1 : 0;
+  // More than the plane would have if it went on: seen askew it ends later on one side, but is no denser.
+  const double plane_has =
+      within[fuller] / std::max(half_width - kWindow * noise, noise) * 2 * kWindow * noise;
+  if (std::abs(excess) > kExcess * sigma && at_edge[fuller] > kDenser * plane_has) {
+    out.points = std::move(half[1 - fuller]);
     out.one_side = true;
   }
   if (out.points.size() > kMostPoints) {

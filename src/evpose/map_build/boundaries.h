@@ -22,7 +22,7 @@ struct StepFit {
   double place = 0, slope = 0;  ///< of the edge at t = 0, and per metre of t
   double blur_m = 0;            ///< 1 sigma
   double sigma_place = 0, sigma_slope = 0;
-  double rest = 0;  ///< density beyond, as a share of that within
+  double rest = 0;     ///< density beyond, as a share of that within
   double density = 0;  ///< within, per square metre
   double log_likelihood = 0;
   bool converged = false;

@@ -201,12 +201,13 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
     const Eigen::Vector3d out_a = line.direction.cross(a.normal) * (sides_a > 0 ? -1 : 1);
     const Eigen::Vector3d out_b = line.direction.cross(b.normal) * (sides_b > 0 ? -1 : 1);
     const Eigen::Vector3d begin = line.origin + t0 * line.direction, end = line.origin + t1 * line.direction;
-    const std::vector<Eigen::Vector3d> around = points_around(
-        surface_, tree_, begin, end, strip_reach_m(surface_.scale.noise_m, sine, spacing[spacing.size() / 2]));
-    const StripFit strip_a =
-        fit_strip(around, {begin, end, -out_a, a, b, sine, spacing[spacing.size() / 2]}, surface_.scale.noise_m);
-    const StripFit strip_b =
-        fit_strip(around, {begin, end, -out_b, b, a, sine, spacing[spacing.size() / 2]}, surface_.scale.noise_m);
+    const std::vector<Eigen::Vector3d> around =
+        points_around(surface_, tree_, begin, end,
+                      strip_reach_m(surface_.scale.noise_m, sine, spacing[spacing.size() / 2]));
+    const StripFit strip_a = fit_strip(around, {begin, end, -out_a, a, b, sine, spacing[spacing.size() / 2]},
+                                       surface_.scale.noise_m);
+    const StripFit strip_b = fit_strip(around, {begin, end, -out_b, b, a, sine, spacing[spacing.size() / 2]},
+                                       surface_.scale.noise_m);
     Piece piece;
     piece.kind = ContourKind::crease;
     piece.plane_a = pair.first;

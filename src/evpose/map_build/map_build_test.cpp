@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -132,6 +133,78 @@ TEST(MapBuilder, APlateEndsWhereItEndsWhateverItsDensity) {
   }
 }
 
+/// Rms distance across the contour of what was built along a line, and its length.
+std::pair<double, double> across_line(const ContourMap& map, const Eigen::Vector3d& on,
+                                      const Eigen::Vector3d& along, double reach_m) {
+  double squares = 0, length = 0;
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    const auto& p = map.points[i];
+    const Eigen::Vector3d d = map.position(i) - on, across = d - along * along.dot(d);
+    if (std::abs(p.tangent.cast<double>().dot(along)) < 0.95 || across.norm() > reach_m) continue;
+    squares += across.squaredNorm() * static_cast<double>(p.length);
+    length += static_cast<double>(p.length);
+  }
+  return {length > 0 ? std::sqrt(squares / length) : INFINITY, length};
+}
+
+TEST(MapBuilder, AnEdgeBesideASkirtingIsTheSkirtings) {
+  Scan scan(20);  // a wall with a skirting of 16 mm, 12 cm high
+  scan.rectangle({0, 0, 0}, {2, 0, 0}, {0, 1.5, 0});
+  scan.rectangle({0, 0, 0.12}, {2, 0, 0}, {0, 0, 1.5}).rectangle({0, 0.016, 0}, {2, 0, 0}, {0, 0, 0.12});
+  const auto built = build(scan.cloud());
+  ASSERT_TRUE(built) << built.error().line();
+  const auto [rms, length] = across_line(built->map, {0, 0.016, 0}, Eigen::Vector3d::UnitX(), 0.03);
+  EXPECT_GT(length, 1.5);
+  EXPECT_LT(rms, 0.004);
+}
+
+TEST(MapBuilder, APillarDoesNotLean) {
+  double worst = 0;
+  for (unsigned seed = 21; seed < 24; ++seed) {
+    Scan scan(seed);
+    scan.rectangle({0, 0, 0}, {0.3, 0, 0}, {0, 0, 2}).rectangle({0, 0, 0}, {0, 0.3, 0}, {0, 0, 2});
+    scan.rectangle({-1, -1, 0}, {3, 0, 0}, {0, 3, 0}, 1000);
+    const auto built = build(scan.cloud());
+    ASSERT_TRUE(built) << built.error().line();
+    const auto [rms, length] = across_line(built->map, {0, 0, 0}, Eigen::Vector3d::UnitZ(), 0.03);
+    EXPECT_GT(length, 1.5);
+    worst = std::max(worst, rms);
+  }
+  EXPECT_LT(worst, 0.003);
+}
+
+TEST(MapBuilder, NoiseAlongAskewRaysDoesNotMoveAnEdge) {
+  // A plate seen from the side at 45 degrees: noise lifts points and shifts them outwards at once.
+  PointCloud cloud;
+  std::mt19937 random(25);
+  std::uniform_real_distribution<double> share(0, 1);
+  std::normal_distribution<double> noise(0, kNoise);
+  for (int i = 0; i < 6000; ++i) {
+    const double e = noise(random);
+    cloud.points.emplace_back(
+        Eigen::Vector3d(1.2 * share(random) - 0.6 + e, 2 * share(random) - 1, e).cast<float>());
+  }
+  const auto built = build(cloud);
+  ASSERT_TRUE(built) << built.error().line();
+  for (const double side : {-0.6, 0.6}) {
+    const auto [rms, length] = across_line(built->map, {side, 0, 0}, Eigen::Vector3d::UnitY(), 0.03);
+    EXPECT_GT(length, 1.2);
+    EXPECT_LT(rms, 0.4 * kNoise);
+  }
+}
+
+TEST(MapBuilder, AFaceTooNarrowForAPlaneStillMakesACrease) {
+  Scan scan(26);  // a table top with a board of 6 cm under its front
+  scan.rectangle({0, 0, 0}, {1.4, 0, 0}, {0, 0.8, 0}).rectangle({0, 0, -0.06}, {1.4, 0, 0}, {0, 0, 0.06});
+  const auto built = build(scan.cloud());
+  ASSERT_TRUE(built) << built.error().line();
+  const auto [rms, length] = across_line(built->map, {0, 0, 0}, Eigen::Vector3d::UnitX(), 0.03);
+  EXPECT_GT(length, 0.9);
+  EXPECT_LT(rms, 0.005);
+  for (const auto& p : built->map.points)
+    EXPECT_TRUE(p.kind != ContourKind::crease || p.normal_b.norm() > 0.9F);
+}
+
 TEST(MapBuilder, TheSameBytesForAnyNumberOfThreads) {
   const auto one = build(room_corner(4), 1), three = build(room_corner(4), 3);
   ASSERT_TRUE(one && three);
@@ -194,6 +267,40 @@ TEST(StepFit, FindsTheEdgeOfADensityWithinItsOwnError) {
     EXPECT_LT(step.sigma_place, 0.003);
   }
   EXPECT_NEAR(squares / kTrials, 1, 0.6);
+}
+
+TEST(StepFit, TheTrueSoftnessIsTheLikeliest) {
+  std::mt19937 random(27);
+  std::uniform_real_distribution<double> t(-0.5, 0.5), d(-0.15, 0.01);
+  std::normal_distribution<double> blur(0, 0.008);
+  std::vector<Eigen::Vector2d> points;
+  for (int i = 0; i < 3000; ++i) {
+    const Eigen::Vector2d p(t(random), d(random) + blur(random));
+    if (std::abs(p.y()) < 0.07) points.push_back(p);
+  }
+  const StepFit right = fit_step(points, 0.5, 0.07, 0.008);
+  ASSERT_TRUE(right.converged);
+  EXPECT_NEAR(right.place, 0.01, 0.002);
+  for (const double wrong : {0.002, 0.03, 0.045}) {
+    const StepFit step = fit_step(points, 0.5, 0.07, wrong);
+    EXPECT_LT(step.log_likelihood, right.log_likelihood);
+  }
+}
+
+TEST(Neighbours, WithinIsWhatCountingFinds) {
+  std::mt19937 random(28);
+  std::uniform_real_distribution<float> share(0, 1);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 2000; ++i) points.emplace_back(share(random), share(random), share(random));
+  const Neighbours tree(points);
+  std::vector<std::uint32_t> found;
+  const Eigen::Vector3f p(0.4F, 0.5F, 0.6F);
+  tree.within(p, 0.2F, found);
+  std::sort(found.begin(), found.end());
+  std::vector<std::uint32_t> counted;
+  for (std::uint32_t i = 0; i < points.size(); ++i)
+    if ((points[i] - p).norm() < 0.2F) counted.push_back(i);
+  EXPECT_EQ(found, counted);
 }
 
 TEST(Outline, HasTheAreaOfThePlateWithoutItsHole) {

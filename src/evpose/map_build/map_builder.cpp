@@ -128,8 +128,8 @@ void describe(ConfigTable& table, BuildConfig& c) {
             "least points of a plane, in patches that tell a normal", {1, 1e6});
   table.add("plane_rough", c.plane.most_rough, "",
             "roughest plane that has contours, in units of the typical rms", {1, 100});
-  table.add("plane_tilt", c.plane.most_tilt_rad, "rad", "most error of the direction of a plane with contours",
-            {0.0001, 1});
+  table.add("plane_tilt", c.plane.most_tilt_rad, "rad",
+            "most error of the direction of a plane with contours", {0.0001, 1});
   table.add("crease_angle", c.crease.least_angle_rad, "rad", "least between two planes that make a crease",
             {0.05, 1.5});
   table.add("crease_length", c.crease.least_length_m, "m", "least of a crease", {0, 10});

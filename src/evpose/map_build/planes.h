@@ -40,7 +40,7 @@ struct PlaneConfig {
   /// Rms of a plane that has contours, in units of the typical plane's.
   double most_rough = 2;
   double most_tilt_rad = 0.008;  ///< error of the direction of a plane that has contours, 1 sigma
-  double merge_rad = 0.026;  ///< planes that touch and agree to this angle and to the noise become one
+  double merge_rad = 0.026;      ///< planes that touch and agree to this angle and to the noise become one
 };
 
 /// Region growing on normals, from the flattest points on (EV-Pose, Map Construction): each region follows

@@ -36,8 +36,8 @@ double strip_reach_m(double noise_m, double sine, double spacing_m);
 
 /// Walls carry skirtings, floors sag, scans are registered to a centimetre: a face need not lie in its plane
 /// where the edge is. The height at which the points beside the edge lie is sought in a window around itself,
-/// so that neither the plane's gate nor layers behind draw it. The result is the mean over two cases, that the
-/// face is in its plane and that it is anywhere near, weighed by how well each explains the height; both
+/// so that neither the plane's gate nor layers behind draw it. The result is the mean over two cases, that
+/// the face is in its plane and that it is anywhere near, weighed by how well each explains the height; both
 /// cases' spread is in sigma.
 StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace& place, double noise_m);
 

@@ -11,6 +11,7 @@
 #include <numeric>
 #include <set>
 
+#include "evpose/report/map_accuracy.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/page.h"
 #include "evpose/report/png.h"
@@ -311,6 +312,49 @@ TEST(Summary, ScoreWordsAreThoseOfTheSummary) {
   for (const std::string& word : agreed) EXPECT_TRUE(j["accuracy"].contains(word)) << word;
   EXPECT_EQ(j["coverage"], 1);
   EXPECT_NE(score_text(score).find("ate_mean_mm"), std::string::npos);
+}
+
+/// Contour points every 2 cm along a line.
+void add_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, ContourMap& map) {
+  const double length = (to - from).norm();
+  const int count = static_cast<int>(length / 0.02);
+  for (int k = 0; k < count; ++k) {
+    ContourPoint p;
+    p.position = (from + (to - from) * ((k + 0.5) / count)).cast<float>();
+    p.tangent = ((to - from) / length).cast<float>();
+    p.normal = p.tangent.unitOrthogonal();
+    p.length = 0.02F;
+    p.sigma = 0.002F;
+    map.points.push_back(p);
+  }
+}
+
+TEST(MapAccuracy, ALonePadSeenFromTwoMetresTellsLittleSideways) {
+  const auto camera = make_camera({460, 460, 319.5, 239.5, "none", {}, {640, 480}});
+  ASSERT_TRUE(camera);
+  ContourMap map;
+  constexpr double kHalf = 0.25;
+  const Eigen::Vector3d corners[4] = {
+      {-kHalf, -kHalf, 0}, {kHalf, -kHalf, 0}, {kHalf, kHalf, 0}, {-kHalf, kHalf, 0}};
+  for (int k = 0; k < 4; ++k) add_line(corners[k], corners[(k + 1) % 4], map);
+  Eigen::Matrix3d down;
+  down << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  const Pose above{Eigen::Quaterniond(down), {0, 0, 2}};
+  const auto accuracy = [&] {
+    std::vector<std::uint32_t> all(map.points.size());
+    std::iota(all.begin(), all.end(), 0U);
+    return expected_accuracy(map, all, **camera, above);
+  };
+  const ViewAccuracy alone = accuracy();
+  EXPECT_LT(std::abs(alone.worst_axis.z()), 0.1);
+  EXPECT_GT(alone.worst_mm, 10);
+  // Boxes of different heights around it tell tilt from sideways.
+  for (const double x : {-0.7, 0.5})
+    for (const double z : {0.0, 0.4, 0.8}) {
+      add_line({x, -0.3, z}, {x, 0.3, z}, map);
+      add_line({x, 0.3, z}, {x + 0.2, 0.3, z}, map);
+    }
+  EXPECT_LT(accuracy().worst_mm, alone.worst_mm / 3);
 }
 
 }  // namespace

@@ -216,7 +216,7 @@ class MapBuildTest(unittest.TestCase):
         write_ply(self.root / "stray.ply", stray)
         warned = MapFileTest.run_evpose("map", "build", self.root / "stray.ply", "-o", self.root / "stray.h5").stderr
         self.assertRegex(warned, r"\b2\b.*finite|finite.*\b2\b")
-        write_ply(self.root / "cm.ply", 1000 * self.points)
+        write_ply(self.root / "cm.ply", 3000 * self.points)  # a hall of 60 m in centimetres
         told = subprocess.run([EVPOSE, "map", "build", str(self.root / "cm.ply"), "-o", str(self.root / "cm.h5")],
                               capture_output=True, text=True, timeout=60).stderr
         self.assertRegex(told, "metres")

@@ -94,9 +94,10 @@ def figures(evpose, shared):
             events = re.search(r"events: (\d+) arrived, (\d+) shed", printed)
             updates = re.search(r"(\d+) updates", printed)
             missed = re.search(r"(\d+) missed", heard)
+            words = f"{delay[1]} / {delay[2]}" if delay else "no pose was sent"
             possible = round(300 * seconds)
             print(f"| {recording}{' and noise' if noise else ''} | {int(events[1]) / seconds / 1e6:.1f} | "
-                  f"{delay[1]} / {delay[2]} | {updates[1]} of {possible} | {missed[1]} | {100 * int(events[2]) / int(events[1]):.1f} % |", flush=True)
+                  f"{words} | {updates[1]} of {possible} | {missed[1]} | {100 * int(events[2]) / int(events[1]):.1f} % |", flush=True)
 
 
 def soak(evpose, shared, minutes):

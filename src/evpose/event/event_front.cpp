@@ -9,6 +9,9 @@ namespace evpose {
 namespace {
 constexpr double kLongestBurst_s = 0.1;
 constexpr double kShortestBurst_s = 1e-3;
+constexpr std::size_t kAhead = 16;  // events; as long as memory takes to answer
+
+Polarity polarity_of(const Event& e) { return e.on ? Polarity::on : Polarity::off; }
 }  // namespace
 
 void describe(ConfigTable& table, EventFrontConfig& c) {
@@ -36,7 +39,15 @@ void EventFront::rebase(std::uint32_t shift_us) {
 
 void EventFront::take(const EventPacket& packet, std::span<const Event> events) {
   const int width = surface_.width(), height = surface_.height();
-  for (const Event& e : events) {
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    if (i + kAhead < events.size()) {
+      const Event& later = events[i + kAhead];
+      if (later.x < width && later.y < height) {
+        filter_.prefetch(later.x, later.y);
+        surface_.prefetch(later.x, later.y, polarity_of(later));
+      }
+    }
+    const Event& e = events[i];
     ++counts_.read;
     if (e.x >= width || e.y >= height) {
       ++counts_.outside;
@@ -46,7 +57,7 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
     if (!filter_.keep(e.x, e.y, e.on != 0, stamp)) continue;
     ++counts_.kept;
     kept_.push_back({stamp, e.x, e.y, e.on});
-    surface_.insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, stamp, burst_us_);
+    surface_.insert(e.x, e.y, polarity_of(e), stamp, burst_us_);
   }
 }
 

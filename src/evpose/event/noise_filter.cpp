@@ -24,11 +24,8 @@ void describe(ConfigTable& table, NoiseFilterConfig& c) {
 NoiseFilter::NoiseFilter(int width, int height, const NoiseFilterConfig& config)
     : config_(config), width_(width), height_(height), stride_(static_cast<std::size_t>(width + 2)) {
   const std::size_t n = stride_ * static_cast<std::size_t>(height + 2);
-  last_.resize(n);
+  cells_.resize(n);
   if (config.same_polarity) last_on_.resize(n);
-  seen_.resize(n);
-  unsupported_.resize(n);
-  masked_.resize(n);
   set_motion(0);
 }
 
@@ -41,30 +38,31 @@ void NoiseFilter::set_motion(double flow_px_per_s) {
 void NoiseFilter::end_second(std::uint32_t stamp_us) {
   if (second_end_us_ != 0) {
     std::vector<std::uint16_t> active;
-    for (const std::uint16_t n : seen_)
-      if (n > 0) active.push_back(n);
+    for (const Cell& c : cells_)
+      if (c.seen > 0 && c.unsupported != kMasked) active.push_back(c.seen);
     if (!active.empty()) {
       const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
       std::nth_element(active.begin(), middle, active.end());
       const double limit = std::max<double>(config_.hot_min_events, config_.hot_factor * *middle);
       for (int y = 0; y < height_; ++y)
         for (int x = 0; x < width_; ++x) {
-          const std::size_t i = static_cast<std::size_t>(y + 1) * stride_ + static_cast<std::size_t>(x + 1);
-          if (masked_[i] || unsupported_[i] < limit) continue;
-          masked_[i] = 1;
-          last_[i] = 0;  // its past events support nobody
-          if (!last_on_.empty()) last_on_[i] = 0;
+          Cell& c = cells_[index(x, y)];
+          if (c.unsupported == kMasked || c.unsupported < limit) continue;
+          c = {0, 0, kMasked};  // its past events support nobody
+          if (!last_on_.empty()) last_on_[index(x, y)] = 0;
           hot_.push_back({x, y});
         }
     }
   }
-  std::fill(seen_.begin(), seen_.end(), std::uint16_t{0});
-  std::fill(unsupported_.begin(), unsupported_.end(), std::uint16_t{0});
+  for (Cell& c : cells_) {
+    c.seen = 0;
+    if (c.unsupported != kMasked) c.unsupported = 0;
+  }
   second_end_us_ = stamp_us + 1'000'000;
 }
 
 void NoiseFilter::rebase(std::uint32_t shift_us) {
-  rebase_stamps(last_, shift_us);
+  for (Cell& c : cells_) c.last = c.last > shift_us ? c.last - shift_us : 0;
   rebase_stamps(last_on_, shift_us);
   second_end_us_ = second_end_us_ > shift_us ? second_end_us_ - shift_us : 1;
 }

@@ -34,14 +34,28 @@ class NoiseFilter {
   /// True if the event is to be kept. O(1) but for one pass over the pixels a second. Pixel inside the image.
   bool keep(int x, int y, bool on, std::uint32_t stamp_us) {
     if (stamp_us >= second_end_us_) end_second(stamp_us);
-    const std::size_t i = static_cast<std::size_t>(y + 1) * stride_ + static_cast<std::size_t>(x + 1);
-    if (masked_[i]) return false;
-    std::uint32_t* const last = config_.same_polarity && on ? last_on_.data() : last_.data();
-    const bool supported = newest_neighbour(last, i) + support_us_ >= stamp_us;
-    last[i] = stamp_us;
-    if (seen_[i] != 0xFFFF) ++seen_[i];
-    if (!supported && unsupported_[i] != 0xFFFF) ++unsupported_[i];
+    const std::size_t i = index(x, y);
+    Cell& cell = cells_[i];
+    if (cell.unsupported == kMasked) return false;
+    bool supported;
+    if (config_.same_polarity && on) {
+      supported = newest_neighbour(&last_on_[i]) + support_us_ >= stamp_us;
+      last_on_[i] = stamp_us;
+    } else {
+      supported = newest_neighbour(&cell) + support_us_ >= stamp_us;
+      cell.last = stamp_us;
+    }
+    if (cell.seen != 0xFFFF) ++cell.seen;
+    if (!supported && cell.unsupported != kMasked - 1) ++cell.unsupported;
     return supported || !config_.on;
+  }
+
+  /// Brings what keep() reads for this pixel near. Pixel inside the image.
+  void prefetch(int x, int y) const {
+    const Cell* const cell = &cells_[index(x, y)];
+    __builtin_prefetch(cell - stride_);
+    __builtin_prefetch(cell, 1);
+    __builtin_prefetch(cell + stride_);
   }
 
   struct Pixel {
@@ -53,13 +67,27 @@ class NoiseFilter {
   void rebase(std::uint32_t shift_us);
 
  private:
-  std::uint32_t newest_neighbour(const std::uint32_t* last, std::size_t i) const {
-    const std::uint32_t* const up = last + i - stride_;
-    const std::uint32_t* const row = last + i;
-    const std::uint32_t* const down = last + i + stride_;
+  static constexpr std::uint16_t kMasked = 0xFFFF;
+  /// Together, so that an event touches three lines of memory and no more.
+  struct Cell {
+    std::uint32_t last = 0;
+    std::uint16_t seen = 0, unsupported = 0;  ///< events this second; kMasked: of a hot pixel
+  };
+  static std::uint32_t stamp_of(const Cell& cell) { return cell.last; }
+  static std::uint32_t stamp_of(std::uint32_t stamp) { return stamp; }
+
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y + 1) * stride_ + static_cast<std::size_t>(x + 1);
+  }
+  template <class Stamp>
+  std::uint32_t newest_neighbour(const Stamp* row) const {
+    const Stamp* const up = row - stride_;
+    const Stamp* const down = row + stride_;
     const auto later = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
-    const std::uint32_t a = later(later(up[-1], up[0]), later(up[1], row[-1]));
-    const std::uint32_t b = later(later(down[-1], down[0]), later(down[1], row[1]));
+    const std::uint32_t a =
+        later(later(stamp_of(up[-1]), stamp_of(up[0])), later(stamp_of(up[1]), stamp_of(row[-1])));
+    const std::uint32_t b =
+        later(later(stamp_of(down[-1]), stamp_of(down[0])), later(stamp_of(down[1]), stamp_of(row[1])));
     const std::uint32_t newest = later(a, b);
     // "Never" must not support the first moments of the clock.
     return newest == 0 ? 0 - support_us_ : newest;
@@ -71,9 +99,8 @@ class NoiseFilter {
   std::size_t stride_;
   std::uint32_t support_us_;
   std::uint32_t second_end_us_ = 0;
-  std::vector<std::uint32_t> last_, last_on_;  ///< with a border of one pixel; last_on_ only if same_polarity
-  std::vector<std::uint16_t> seen_, unsupported_;  ///< this second, per pixel
-  std::vector<std::uint8_t> masked_;
+  std::vector<Cell> cells_;             ///< with a border of one pixel
+  std::vector<std::uint32_t> last_on_;  ///< of on events, if same_polarity; the cells' are of off events then
   std::vector<Pixel> hot_;
 };
 

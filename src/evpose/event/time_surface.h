@@ -68,6 +68,11 @@ class TimeSurface {
     c.last = stamp_us;
   }
 
+  /// Brings what insert() touches near. Pixel inside the image.
+  void prefetch(int x, int y, Polarity polarity) const {
+    __builtin_prefetch(&cells_[static_cast<int>(polarity)][index(x, y)], 1);
+  }
+
   /// Stamp of the last event, 0 if none. Valid up to kBorder pixels outside of the image (always 0 there).
   std::uint32_t last(int x, int y, Polarity polarity) const {
     return cells_[static_cast<int>(polarity)][index(x, y)].last;

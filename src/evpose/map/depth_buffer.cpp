@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace evpose {
 namespace {
@@ -21,28 +22,40 @@ DepthBuffer::DepthBuffer(const Eigen::Vector2d& tangents, double cell)
   cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
 }
 
-void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double near_m) {
+void DepthBuffer::start(const ContourMap& map, const Pose& T_map_cam, double near_m) {
   std::fill(cells_.begin(), cells_.end(), Cell{0, Eigen::Vector3f::Zero()});
   const Pose T_cam_map = T_map_cam.inverse();
-  const Eigen::Matrix3f R = T_cam_map.rotation().cast<float>();
-  const Eigen::Vector3f offset = (T_cam_map * map.anchor).cast<float>();
-  vertices_cam_.resize(map.occluders.vertices.size());
-  for (std::size_t i = 0; i < vertices_cam_.size(); ++i)
-    vertices_cam_[i] = R * map.occluders.vertices[i] + offset;
-  for (const auto& t : map.occluders.triangles) {
-    const Eigen::Vector3f corners[3] = {vertices_cam_[t[0]], vertices_cam_[t[1]], vertices_cam_[t[2]]};
-    clip_and_draw(corners, static_cast<float>(near_m));
+  R_cam_map_ = T_cam_map.rotation().cast<float>();
+  offset_ = (T_cam_map * map.anchor).cast<float>();
+  near_m_ = static_cast<float>(near_m);
+}
+
+void DepthBuffer::draw(const ContourMap& map, std::span<const std::uint32_t> triangles) {
+  const TriangleMesh& mesh = map.occluders;
+  for (const std::uint32_t number : triangles) {
+    Eigen::Vector3f corners[3];
+    for (std::size_t k = 0; k < 3; ++k)
+      corners[k] = R_cam_map_ * mesh.vertices[mesh.triangles[number][k]] + offset_;
+    clip_and_draw(corners);
   }
 }
 
-void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners, float near_m) {
+void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double near_m) {
+  start(map, T_map_cam, near_m);
+  std::vector<std::uint32_t> all(map.occluders.triangles.size());
+  std::iota(all.begin(), all.end(), 0u);
+  draw(map, all);
+}
+
+void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners) {
   Eigen::Vector3f kept[4];
   int n = 0;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f& a = corners[i];
     const Eigen::Vector3f& b = corners[(i + 1) % 3];
-    if (a.z() >= near_m) kept[n++] = a;
-    if ((a.z() >= near_m) != (b.z() >= near_m)) kept[n++] = a + (near_m - a.z()) / (b.z() - a.z()) * (b - a);
+    if (a.z() >= near_m_) kept[n++] = a;
+    if ((a.z() >= near_m_) != (b.z() >= near_m_))
+      kept[n++] = a + (near_m_ - a.z()) / (b.z() - a.z()) * (b - a);
   }
   if (n < 3) return;
   // The plane n.x = d gives 1 / z = n.(x / z, y / z, 1) / d; planes through the eye are seen edge-on.

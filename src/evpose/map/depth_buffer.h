@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "evpose/core/pose.h"
@@ -16,7 +18,11 @@ class DepthBuffer {
   /// Covers |x / z|, |y / z| <= tangents, with square cells of `cell` (tangent units).
   DepthBuffer(const Eigen::Vector2d& tangents, double cell);
 
-  /// Draws the triangles as seen from the camera; those nearer than `near_m` are cut there.
+  /// Empties the grid and looks from a new place.
+  void start(const ContourMap& map, const Pose& T_map_cam, double near_m);
+  /// Draws triangles of that map, by number; what is nearer than `near_m` is cut off.
+  void draw(const ContourMap& map, std::span<const std::uint32_t> triangles);
+  /// Both, with all triangles.
   void render(const ContourMap& map, const Pose& T_map_cam, double near_m);
 
   /// True if a surface stands before the point. The surface that holds the cell is asked at the point itself,
@@ -31,13 +37,15 @@ class DepthBuffer {
     Eigen::Vector3f slope;
   };
   void draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);
-  void clip_and_draw(const Eigen::Vector3f* corners, float near_m);
+  void clip_and_draw(const Eigen::Vector3f* corners);
 
   Eigen::Vector2f tangents_;
   float cell_;
   int columns_, rows_;
   std::vector<Cell> cells_;
-  std::vector<Eigen::Vector3f> vertices_cam_;
+  Eigen::Matrix3f R_cam_map_;
+  Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
+  float near_m_ = 0;
 };
 
 }  // namespace evpose

@@ -10,8 +10,10 @@
 namespace evpose {
 namespace {
 
-constexpr int kBlockCubes = 8;       // a block is 8 x 8 x 8 cubes
-constexpr double kDepthCell_px = 2;  // of the occluders' depth buffer
+constexpr int kBlockCubes = 8;                 // a block is 8 x 8 x 8 cubes
+constexpr float kOccluderCubes = 4;            // triangles are gathered in boxes of 4 x 4 x 4 cubes ...
+constexpr std::uint32_t kMostOccluders = 256;  // ... and by so many
+constexpr double kDepthCell_px = 2;            // of the occluders' depth buffer
 // Two points are on one contour of the image if their directions and offsets agree this well.
 constexpr float kSameDirectionSin = 0.2F;
 constexpr float kSameLine_px = 0.75F;
@@ -67,11 +69,12 @@ void describe(ConfigTable& table, VisibleSetConfig& c) {
   table.add("far_m", c.far_m, "m", "points further away are left out", {0.1, 1e5});
   table.add("near_m", c.near_m, "m", "points nearer than this are left out", {1e-3, 100});
   table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
-  table.add("budget", c.budget, "", "most points in all", {6, 100000});
+  table.add("budget", c.budget, "", "most points in all", {6, 65535});
   table.add("margin_px", c.margin_px, "px", "points may lie this far outside of the image when chosen",
             {0, 1000});
   table.add("refresh_px", c.refresh_px, "px", "points are chosen again when the view has moved by this much",
             {0, 1000});
+  table.add("slice", c.slice, "", "points and triangles looked at per update meanwhile", {100, 1e9});
   table.add("occlusion", c.occlusion, "leave out points behind the map's occluders, if it has any");
   table.add("grazing_sin", c.grazing_sin, "", "least sine of the angle between contour and line of sight",
             {0, 1});
@@ -113,6 +116,32 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
     blocks_.push_back({keys[order_[begin]].block, first_cube, static_cast<std::uint32_t>(cubes_.size()),
                        whole.centre, whole.radius});
     begin = block_end;
+  }
+  sort_occluders();
+}
+
+void ContourIndex::sort_occluders() {
+  const TriangleMesh& mesh = map_.occluders;
+  const auto n = static_cast<std::uint32_t>(mesh.triangles.size());
+  const auto corner = [&mesh](std::uint32_t triangle, std::size_t k) -> const Eigen::Vector3f& {
+    return mesh.vertices[mesh.triangles[triangle][k]];
+  };
+  std::vector<std::int64_t> keys(n);
+  for (std::uint32_t i = 0; i < n; ++i)
+    keys[i] = key_of((corner(i, 0) + corner(i, 1) + corner(i, 2)) / 3, cube_m_ * kOccluderCubes);
+  occluder_order_.resize(n);
+  std::iota(occluder_order_.begin(), occluder_order_.end(), 0u);
+  std::sort(occluder_order_.begin(), occluder_order_.end(), [&keys](std::uint32_t a, std::uint32_t b) {
+    return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
+  });
+  for (std::uint32_t begin = 0, end = 0; begin < n; begin = end) {
+    while (end < n && end - begin < kMostOccluders &&
+           keys[occluder_order_[end]] == keys[occluder_order_[begin]])
+      ++end;
+    const Sphere s = bound(3 * begin, 3 * end, [&](std::uint32_t i) -> const Eigen::Vector3f& {
+      return corner(occluder_order_[i / 3], i % 3);
+    });
+    occluders_.push_back({s.centre, s.radius, begin, end});
   }
 }
 
@@ -163,96 +192,157 @@ VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const Vi
     }
   }
   widest = std::min(widest + config.margin_px / camera.focal_px(), camera.valid_angle());
-  cone_cos_ = std::cos(widest);
-  cone_sin_ = std::sin(widest);
+  cone_cos_ = static_cast<float>(std::cos(widest));
+  cone_sin_ = static_cast<float>(std::sin(widest));
   columns_ = static_cast<int>((size.width + 2 * config.margin_px) / config.stride_px) + 4;
   rows_ = static_cast<int>((size.height + 2 * config.margin_px) / config.stride_px) + 4;
   cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
 }
 
-bool VisibleSet::moved(const Pose& T_map_cam) const {
-  if (!chosen_once_) return true;
-  const Vector6d d = T_map_cam.minus(T_map_cam_);
-  const double angle = d.tail<3>().norm() + d.head<3>().norm() / std::max(nearest_m_, config_.near_m);
-  return angle * camera_.focal_px() > config_.refresh_px;
+double VisibleSet::moved_px(const Pose& from, const Pose& to) const {
+  const Vector6d d = to.minus(from);
+  return (d.tail<3>().norm() + d.head<3>().norm() / std::max(nearest_m_, config_.near_m)) *
+         camera_.focal_px();
 }
 
 const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
-  if (moved(T_map_cam)) refresh(T_map_cam);
+  const double moved = chosen_once_ ? moved_px(T_map_cam_, T_map_cam) : config_.refresh_px + 1;
+  if (moved > config_.refresh_px) {
+    // Too late for slices, unless what is under way is of this place.
+    if (!under_way_ || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px) start(T_map_cam);
+    work(remaining_);
+  } else if (under_way_ || moved > 0.5 * config_.refresh_px) {
+    if (!under_way_) start(T_map_cam);
+    // In equal slices until the move is complete, as far as it goes on like this.
+    const double step = last_ ? moved_px(*last_, T_map_cam) : 0, left = config_.refresh_px - moved;
+    const auto share = static_cast<std::size_t>(static_cast<double>(remaining_) *
+                                                std::min(1.0, 1.5 * step / std::max(left, 1e-9)));
+    work(std::max(share, static_cast<std::size_t>(config_.slice)));
+  }
+  last_ = T_map_cam;
   return points_;
 }
 
-bool VisibleSet::add(std::uint32_t point, const Eigen::Vector2d& pixel, const Eigen::Vector2d& direction) {
-  const auto stride = static_cast<float>(config_.stride_px);
-  const Eigen::Vector2f u = pixel.cast<float>(), t = direction.cast<float>();
+bool VisibleSet::outside_cone(const Eigen::Vector3f& centre, float radius) const {
+  // Distance of the sphere's centre from the cone's surface, positive outside.
+  return std::sqrt(centre.x() * centre.x() + centre.y() * centre.y()) * cone_cos_ - centre.z() * cone_sin_ >
+         radius;
+}
+
+void VisibleSet::start(const Pose& T_map_cam) {
+  under_way_ = true;
+  next_T_map_cam_ = T_map_cam;
+  next_points_.clear();
+  chosen_.clear();
+  std::fill(cells_.begin(), cells_.end(), -1);
+  const ContourMap& map = index_.map();
+  const Pose T_cam_map = T_map_cam.inverse();
+  R_cam_map_ = T_cam_map.rotation().cast<float>();
+  offset_ = (T_cam_map * map.anchor).cast<float>();
+  const auto far_m = static_cast<float>(config_.far_m);
+
+  occluders_.clear();
+  occluders_done_ = cubes_done_ = remaining_ = 0;
+  if (config_.occlusion && !index_.occluders().empty()) {
+    depth_.start(map, T_map_cam, config_.near_m);
+    for (std::uint32_t i = 0; i < index_.occluders().size(); ++i) {
+      const auto& block = index_.occluders()[i];
+      const Eigen::Vector3f centre = R_cam_map_ * block.centre + offset_;
+      if (outside_cone(centre, block.radius) || centre.norm() > far_m + block.radius) continue;
+      occluders_.push_back(i);
+      remaining_ += block.end - block.begin;
+    }
+  }
+  cubes_.clear();
+  index_.near(T_map_cam.p, config_.far_m, cubes_);
+  std::erase_if(cubes_, [&](std::uint32_t i) {
+    const auto& cube = index_.cubes()[i];
+    return outside_cone(R_cam_map_ * cube.centre + offset_, cube.radius);
+  });
+  for (const std::uint32_t i : cubes_) remaining_ += index_.cubes()[i].end - index_.cubes()[i].begin;
+}
+
+void VisibleSet::work(std::size_t most) {
+  std::size_t done = 0;
+  while (done < most && occluders_done_ < occluders_.size()) {
+    const auto& block = index_.occluders()[occluders_[occluders_done_++]];
+    depth_.draw(index_.map(),
+                std::span(index_.occluder_order()).subspan(block.begin, block.end - block.begin));
+    done += block.end - block.begin;
+  }
+  while (done < most && cubes_done_ < cubes_.size()) {
+    const auto& cube = index_.cubes()[cubes_[cubes_done_++]];
+    for (std::uint32_t k = cube.begin; k < cube.end; ++k) look_at(index_.order()[k]);
+    done += cube.end - cube.begin;
+  }
+  remaining_ -= std::min(remaining_, done);
+  if (occluders_done_ == occluders_.size() && cubes_done_ == cubes_.size()) finish();
+}
+
+std::size_t VisibleSet::cell_of(const Eigen::Vector2f& pixel) const {
   const int column = static_cast<int>((pixel.x() + config_.margin_px) / config_.stride_px) + 1;
   const int row = static_cast<int>((pixel.y() + config_.margin_px) / config_.stride_px) + 1;
-  for (int r = row - 1; r <= row + 1; ++r)
-    for (int c = column - 1; c <= column + 1; ++c)
-      for (std::int32_t k = cells_[static_cast<std::size_t>(r * columns_ + c)]; k >= 0;
-           k = chosen_[static_cast<std::size_t>(k)].next) {
+  return static_cast<std::size_t>(row * columns_ + column);
+}
+
+/// True if a chosen point of the same contour is nearer than the stride.
+bool VisibleSet::has_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const {
+  const auto stride = static_cast<float>(config_.stride_px);
+  const auto middle = static_cast<std::ptrdiff_t>(cell_of(u));
+  for (int row = -1; row <= 1; ++row)
+    for (int column = -1; column <= 1; ++column) {
+      std::int32_t k = cells_[static_cast<std::size_t>(middle + row * columns_ + column)];
+      while (k >= 0) {
         const Chosen& other = chosen_[static_cast<std::size_t>(k)];
         const Eigen::Vector2f d = u - other.pixel;
         if (d.squaredNorm() < stride * stride && std::abs(t.x() * d.y() - t.y() * d.x()) < kSameLine_px &&
             std::abs(t.x() * other.direction.y() - t.y() * other.direction.x()) < kSameDirectionSin)
-          return false;
+          return true;
+        k = other.next;
       }
-  std::int32_t& head = cells_[static_cast<std::size_t>(row * columns_ + column)];
-  chosen_.push_back({u, t, head});
-  head = static_cast<std::int32_t>(chosen_.size() - 1);
-  points_.push_back(point);
-  return true;
+    }
+  return false;
 }
 
-void VisibleSet::refresh(const Pose& T_map_cam) {
-  T_map_cam_ = T_map_cam;
-  chosen_once_ = true;
-  candidates_ = 0;
-  points_.clear();
-  chosen_.clear();
-  std::fill(cells_.begin(), cells_.end(), -1);
-  const ImageSize size = camera_.size();
-  const bool occlusion = config_.occlusion && !index_.map().occluders.triangles.empty();
-  if (occlusion) depth_.render(index_.map(), T_map_cam, config_.near_m);
-  near_cubes_.clear();
-  index_.near(T_map_cam.p, config_.far_m, near_cubes_);
-  const Pose T_cam_map = T_map_cam.inverse();
-  const Eigen::Matrix3d R = T_cam_map.rotation();
-  const ContourMap& map = index_.map();
-  const Eigen::Vector3d offset = R * map.anchor + T_cam_map.p;
-  for (const std::uint32_t number : near_cubes_) {
-    const auto& cube = index_.cubes()[number];
-    const Eigen::Vector3d centre = R * cube.centre.cast<double>() + offset;
-    // Distance of the sphere's centre from the cone's surface, positive outside.
-    const double across = std::hypot(centre.x(), centre.y());
-    if (across * cone_cos_ - centre.z() * cone_sin_ > cube.radius) continue;
-    for (std::uint32_t k = cube.begin; k < cube.end; ++k) {
-      const std::uint32_t i = index_.order()[k];
-      const ContourPoint& point = map.points[i];
-      const Eigen::Vector3d x = R * point.position.cast<double>() + offset;
-      if (x.z() < config_.near_m || x.squaredNorm() > config_.far_m * config_.far_m) continue;
-      Matrix23d jacobian;
-      const auto pixel = camera_.project(x, &jacobian);
-      if (!pixel || !size.contains(*pixel, -config_.margin_px)) continue;
-      const Eigen::Vector3d tangent = R * point.tangent.cast<double>();
-      if (tangent.cross(x).squaredNorm() < config_.grazing_sin * config_.grazing_sin * x.squaredNorm())
-        continue;
-      if (occlusion && depth_.hides(x)) continue;
-      ++candidates_;
-      const Eigen::Vector2d direction = jacobian * tangent;
-      if (direction.squaredNorm() > 0) add(i, *pixel, direction.normalized());
-    }
-  }
-  if (points_.size() > static_cast<std::size_t>(config_.budget)) {
-    const auto middle = points_.begin() + config_.budget;
-    std::nth_element(points_.begin(), middle, points_.end(),
+void VisibleSet::look_at(std::uint32_t number) {
+  const ContourPoint& point = index_.map().points[number];
+  const Eigen::Vector3f near_by = R_cam_map_ * point.position + offset_;
+  const auto far_m = static_cast<float>(config_.far_m);
+  if (near_by.z() < static_cast<float>(config_.near_m) || near_by.squaredNorm() > far_m * far_m ||
+      outside_cone(near_by, 0))
+    return;
+  const Eigen::Vector3d x = near_by.cast<double>();
+  Matrix23d jacobian;
+  const auto pixel = camera_.project(x, &jacobian);
+  if (!pixel || !camera_.size().contains(*pixel, -config_.margin_px)) return;
+  const Eigen::Vector3d tangent = (R_cam_map_ * point.tangent).cast<double>();
+  const Eigen::Vector2d along = jacobian * tangent;
+  if (!(along.squaredNorm() > 0)) return;
+  const Eigen::Vector2f u = pixel->cast<float>(), direction = along.normalized().cast<float>();
+  if (has_neighbour(u, direction)) return;
+  if (tangent.cross(x).squaredNorm() < config_.grazing_sin * config_.grazing_sin * x.squaredNorm()) return;
+  if (!occluders_.empty() && depth_.hides(x)) return;
+  std::int32_t& head = cells_[cell_of(u)];
+  chosen_.push_back({u, direction, head});
+  head = static_cast<std::int32_t>(chosen_.size() - 1);
+  next_points_.push_back(number);
+}
+
+void VisibleSet::finish() {
+  if (next_points_.size() > static_cast<std::size_t>(config_.budget)) {
+    const auto middle = next_points_.begin() + config_.budget;
+    std::nth_element(next_points_.begin(), middle, next_points_.end(),
                      [](std::uint32_t a, std::uint32_t b) { return priority_of(a) < priority_of(b); });
-    points_.erase(middle, points_.end());
-    std::sort(points_.begin(), points_.end());
+    next_points_.erase(middle, next_points_.end());
+    std::sort(next_points_.begin(), next_points_.end());
   }
+  points_.swap(next_points_);
+  T_map_cam_ = next_T_map_cam_;
+  chosen_once_ = true;
+  under_way_ = false;
   nearest_m_ = config_.far_m;
   for (const std::uint32_t i : points_)
-    nearest_m_ = std::min(nearest_m_, (map.position(i) - T_map_cam.p).norm());
+    nearest_m_ = std::min(nearest_m_, (index_.map().position(i) - T_map_cam_.p).norm());
 }
 
 }  // namespace evpose

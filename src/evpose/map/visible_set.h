@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "evpose/camera/camera.h"
@@ -31,6 +32,15 @@ class ContourIndex {
   const std::vector<std::uint32_t>& order() const { return order_; }
   const ContourMap& map() const { return map_; }
 
+  /// A handful of occluding triangles that lie together.
+  struct Occluders {
+    Eigen::Vector3f centre;
+    float radius;
+    std::uint32_t begin, end;  ///< range of occluder_order()
+  };
+  const std::vector<Occluders>& occluders() const { return occluders_; }
+  const std::vector<std::uint32_t>& occluder_order() const { return occluder_order_; }
+
   /// Numbers of the cubes that meet the sphere, ascending. Appended to `out`.
   void near(const Eigen::Vector3d& centre_map, double radius_m, std::vector<std::uint32_t>& out) const;
 
@@ -48,6 +58,9 @@ class ContourIndex {
   std::vector<Cube> cubes_;
   std::vector<BlockRange> blocks_;
   std::vector<std::uint32_t> order_;
+  void sort_occluders();
+  std::vector<Occluders> occluders_;
+  std::vector<std::uint32_t> occluder_order_;
 };
 
 struct VisibleSetConfig {
@@ -56,7 +69,8 @@ struct VisibleSetConfig {
   double stride_px = 4;   ///< least distance of two points along one contour, in the image
   int budget = 6000;      ///< most points in all
   double margin_px = 12;  ///< points may lie this far outside of the image when chosen
-  double refresh_px = 8;  ///< chosen again when the view has moved by this much
+  double refresh_px = 8;  ///< chosen again before the view has moved by this much
+  int slice = 4000;       ///< points and triangles looked at per update meanwhile, if that is fast enough
   bool occlusion = true;  ///< leave out points behind the map's occluders, if it has any
   double grazing_sin =
       0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
@@ -69,36 +83,49 @@ class VisibleSet {
  public:
   VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config);
 
-  /// Point numbers of the map for this pose, in an order that depends on nothing but map, camera and the pose
-  /// at the last refresh.
+  /// Point numbers of the map for a pose at most `refresh_px` from this one. They are chosen anew in slices,
+  /// over several calls, so that no call takes long; which depends on the poses of the calls and nothing
+  /// else.
   const std::vector<std::uint32_t>& choose(const Pose& T_map_cam);
 
   /// As of the last call of choose().
   const std::vector<std::uint32_t>& chosen() const { return points_; }
 
-  /// Visible points at the last refresh, before thinning.
-  std::size_t candidates() const { return candidates_; }
-
  private:
-  bool moved(const Pose& T_map_cam) const;
-  void refresh(const Pose& T_map_cam);
+  double moved_px(const Pose& from, const Pose& to) const;
+  void start(const Pose& T_map_cam);
+  /// Looks at so many triangles and points, or a few more; the last slice puts the new choice into points_.
+  void work(std::size_t most);
+  void look_at(std::uint32_t point);
+  void finish();
+  bool outside_cone(const Eigen::Vector3f& centre_cam, float radius) const;
+  bool has_neighbour(const Eigen::Vector2f& pixel, const Eigen::Vector2f& direction) const;
+  std::size_t cell_of(const Eigen::Vector2f& pixel) const;
 
   const ContourIndex& index_;
   const Camera& camera_;
   VisibleSetConfig config_;
-  double cone_cos_, cone_sin_;  ///< of the cone around the optical axis that holds the image
-  Pose T_map_cam_;
+  float cone_cos_, cone_sin_;  ///< of the cone around the optical axis that holds the image
+  std::vector<std::uint32_t> points_;
+  Pose T_map_cam_;        ///< of points_
+  double nearest_m_ = 0;  ///< depth of the nearest of points_
   bool chosen_once_ = false;
+  std::optional<Pose> last_;  ///< of the last call
+
+  // The choice under way.
+  bool under_way_ = false;
+  Pose next_T_map_cam_;
+  Eigen::Matrix3f R_cam_map_;
+  Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
   DepthBuffer depth_;
-  double nearest_m_ = 0;  ///< depth of the nearest chosen point
-  std::size_t candidates_ = 0;
-  std::vector<std::uint32_t> points_, near_cubes_;
+  std::vector<std::uint32_t> occluders_, cubes_;  ///< in view, what is left to look at
+  std::size_t occluders_done_ = 0, cubes_done_ = 0, remaining_ = 0;
+  std::vector<std::uint32_t> next_points_;
   /// A chosen point in the grid of `stride_px` cells that finds its neighbours along the contour.
   struct Chosen {
     Eigen::Vector2f pixel, direction;
     std::int32_t next;  ///< of the same cell, -1: none
   };
-  bool add(std::uint32_t point, const Eigen::Vector2d& pixel, const Eigen::Vector2d& direction);
   int columns_, rows_;
   std::vector<std::int32_t> cells_;
   std::vector<Chosen> chosen_;

@@ -62,16 +62,55 @@ TEST_F(VisibleLaws, IndexFindsWhatBruteForceFinds) {
   }
 }
 
-TEST_F(VisibleLaws, CandidatesAreExactlyTheFrustum) {
+TEST_F(VisibleLaws, ChosenOrBesideAChosenPointIsExactlyTheFrustum) {
   VisibleSetConfig config;
   config.far_m = 6;
   VisibleSet visible(index_, *camera_, config);
   const auto& chosen = visible.choose(pose_);
-  std::size_t expected = 0;
-  for (std::uint32_t i = 0; i < map_.points.size(); ++i) expected += in_frustum(i, config) ? 1u : 0u;
-  EXPECT_EQ(visible.candidates(), expected);
-  EXPECT_GT(expected, 200u);
+  EXPECT_GT(chosen.size(), 200u);
+  const auto pixel = [&](std::uint32_t i) { return *camera_->project(pose_.inverse() * map_.position(i)); };
   for (const std::uint32_t i : chosen) EXPECT_TRUE(in_frustum(i, config));
+  const std::set<std::uint32_t> set(chosen.begin(), chosen.end());
+  for (std::uint32_t i = 0; i < map_.points.size(); ++i)
+    if (in_frustum(i, config) && !set.count(i)) {
+      EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(), [&](std::uint32_t k) {
+        return (pixel(k) - pixel(i)).norm() < config.stride_px + 1e-3;
+      })) << i;
+    }
+}
+
+TEST_F(VisibleLaws, SlicesChooseWhatOneCallChooses) {
+  VisibleSetConfig config;
+  config.slice = 500;
+  VisibleSet sliced(index_, *camera_, config), fresh(index_, *camera_, config);
+  sliced.choose(pose_);
+  Vector6d step = Vector6d::Zero();
+  step(5) = 0.026 * config.refresh_px / camera_->focal_px();
+  const auto before = sliced.chosen();
+  Pose at = pose_;
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(sliced.choose(at = at.plus(step)), before) << i;  // half way, begun
+  for (int i = 0; i < 100; ++i) sliced.choose(at);
+  EXPECT_NE(sliced.chosen(), before);
+  EXPECT_EQ(sliced.chosen(), fresh.choose(at));
+}
+
+TEST_F(VisibleLaws, AChoiceIsNeverOlderThanItsBound) {
+  VisibleSetConfig config;
+  config.slice = 100;
+  VisibleSet sliced(index_, *camera_, config);
+  Pose at = pose_;
+  sliced.choose(at);
+  Vector6d step = Vector6d::Zero();
+  step(5) = 0.3 * config.refresh_px / camera_->focal_px();
+  auto last = sliced.chosen();
+  int unchanged = 0;
+  for (int i = 0; i < 40; ++i) {
+    at = at.plus(step);
+    const auto now = sliced.choose(at);
+    unchanged = now == last ? unchanged + 1 : 0;
+    EXPECT_LE(unchanged, 3) << i;
+    last = now;
+  }
 }
 
 TEST_F(VisibleLaws, PointsOfALineKeepTheirDistanceAndCoverIt) {

@@ -11,6 +11,7 @@
 #include "evpose/core/pose.h"
 #include "evpose/event/event_front.h"
 #include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/strip_map.h"
 
 namespace evpose {
 
@@ -88,40 +89,48 @@ class EventAlignment {
   const ContrastMemory& contrast() const { return contrast_; }
 
  private:
-  struct Claim {
-    std::int32_t sample;
-    float distance, along, rival;  ///< px; rival: distance of the nearest sample of another contour
+  /// What an event needs to know of the sample that it belongs to.
+  struct Line {
+    float x, y, nx, ny;
+    float speed, curvature;           ///< px/us, px/us^2
+    float late_on, late_off;          ///< px, along the normal
+    float gate;                       ///< px
+    float exponent, odds;             ///< exp(exponent d^2) * odds: of the contour against clutter
+    std::int8_t wrong_on, wrong_off;  ///< polarity excluded
+    std::int8_t forward;              ///< +1 if the contour moves along its normal, else -1
   };
   struct Sum {
     double weight = 0, offset = 0, square = 0;
-    int events = 0;
+    int events = 0, net = 0;  ///< net: events near by, for the contrast
   };
   /// How the mean distance answers to an offset: sums over events, slowly forgotten.
   struct Slope {
     double weight = 0, inside = 0, at_gate = 0;
     double value() const;
   };
-  void gates(const EventAlignmentProblem& problem);
-  void sweep(const EventAlignmentProblem& problem);
+  struct Cluster {
+    double weight = 0, map_variance = 0;
+  };
+  void prepare(const EventAlignmentProblem& problem);
   void sum_events(const EventAlignmentProblem& problem, EventAlignmentResult* result);
-  void weigh_clusters(const EventAlignmentProblem& problem, EventAlignmentResult* result) const;
-  void claim_strips(const EventAlignmentProblem& problem);
-  void release_strips();
-  bool same_line(const ContourSample& a, const ContourSample& b) const;
-  double reach(std::size_t sample) const { return std::max(gate_px_[sample], config_.count_px); }
+  void learn_contrast(const EventAlignmentProblem& problem);
+  void weigh_clusters(const EventAlignmentProblem& problem, EventAlignmentResult* result);
+  std::uint32_t cluster_of(const ContourSample& sample) const;
   bool captured() const;
   bool polarity_is_wrong(const ContourSample& sample, int sign) const;
   double lateness(const ContourSample& sample, bool on) const;
 
   ImageSize size_;
   EventAlignmentConfig config_;
-  std::vector<Claim> claims_;               ///< one per pixel; sample < 0: none
-  std::vector<std::uint32_t> touched_;      ///< pixels claimed, to be released
-  std::vector<double> sigma_px_, gate_px_;  ///< per sample
-  std::vector<std::int32_t> claimed_;       ///< pixels, per sample
-  std::vector<Sum> sums_;
+  StripMap strips_;
   ContrastMemory contrast_;
   Slope slope_;
+  // Of the last call, one for each sample; kept so that nothing is allocated from call to call.
+  std::vector<Strip> areas_;
+  std::vector<Line> lines_;
+  std::vector<Sum> sums_;
+  std::vector<Cluster> clusters_;
+  std::vector<std::uint32_t> cluster_numbers_;
 };
 
 }  // namespace evpose

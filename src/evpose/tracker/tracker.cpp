@@ -223,14 +223,17 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
   const Eigen::Matrix3d R_cam_body = T_body_cam.rotation().transpose();
   const Eigen::Vector3d rate_body = fusion_->state().angular_rate;
   // The pose half the span and the whole span ago, by the predicted twist.
-  Pose T_cam_map[3];
+  Eigen::Matrix3d R[3];
+  Eigen::Vector3d offset[3];  // of the map's anchor, camera frame
   for (int k = 0; k < 3; ++k) {
     const double age = 0.5 * k * span_s;
     const Pose past{T_map_body.q * so3::exp(-age * rate_body),
                     T_map_body.p - age * fusion_->state().nav.velocity};
-    T_cam_map[k] = (past * T_body_cam).inverse();
+    const Pose T_cam_map = (past * T_body_cam).inverse();
+    R[k] = T_cam_map.rotation();
+    offset[k] = T_cam_map * setup_.map->anchor;
   }
-  const Eigen::Matrix3d R_cam_map = T_cam_map[0].rotation();
+  const Eigen::Matrix3d R_body_cam = T_body_cam.rotation();
   const Camera& camera = *setup_.camera;
   const ContourMap& map = *setup_.map;
   const double h = 0.5 * span_s;
@@ -240,16 +243,17 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
       fusion_->state().covariance.block<3, 3>(error_state::kBg, error_state::kBg).trace() / 3;
   points_.clear();
   samples_.clear();
-  std::vector<double> flows, depths;
+  flows_.clear();
+  depths_.clear();
   for (const std::uint32_t i : visible_.choose(T_map_body * T_body_cam)) {
-    const Eigen::Vector3d position = map.position(i);
-    const Eigen::Vector3d x_cam = T_cam_map[0] * position;
+    const Eigen::Vector3d position = map.points[i].position.cast<double>();  // from the anchor
+    const Eigen::Vector3d x_cam = R[0] * position + offset[0];
     Matrix23d J;
     const auto pixel = camera.project(x_cam, &J);
-    const auto half_ago = camera.project(T_cam_map[1] * position),
-               ago = camera.project(T_cam_map[2] * position);
+    const auto half_ago = camera.project(R[1] * position + offset[1]),
+               ago = camera.project(R[2] * position + offset[2]);
     if (!pixel || !half_ago || !ago) continue;
-    const Eigen::Vector2d along = J * (R_cam_map * map.points[i].tangent.cast<double>());
+    const Eigen::Vector2d along = J * (R[0] * map.points[i].tangent.cast<double>());
     if (!(along.norm() > 0)) continue;
     const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
     // n.(u(t - a) - u(t)) = -s1 a + s2 a^2 through the two past projections.
@@ -259,9 +263,9 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
       ContourSample s{*pixel, normal, speed, (d2 - 2 * d1) / (2 * h * h), {}};
       const Eigen::RowVector3d across = normal.transpose() * J;
       const Eigen::RowVector3d A = across * R_cam_body;
-      const Eigen::Vector3d x_body = T_body_cam * x_cam;
+      const Eigen::Vector3d x_body = R_body_cam * x_cam + T_body_cam.p;
       s.jacobian.head<3>() = (A * R_body_map).transpose();
-      s.jacobian.tail<3>() = -(A * so3::hat(x_body)).transpose();
+      s.jacobian.tail<3>() = x_body.cross(A.transpose());  // -(A hat(x))^T
       const double sigma_m = map.points[i].sigma > 0 ? map.points[i].sigma : config_.alignment.map_sigma_m;
       s.map_sigma_px = sigma_m * across.norm();
       s.speed_sigma_px_s =
@@ -273,13 +277,13 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
       const RegistrationConfig& c = config_.exponential;
       const double decay_s = std::clamp(c.decay_px / std::max(std::abs(speed), 1e-9), c.decay_min_s,
                                         std::max(c.decay_min_s, c.decay_max_s));
-      points_.push_back({position, 1e6 * decay_s});
+      points_.push_back({map.position(i), 1e6 * decay_s});
     }
-    flows.push_back((*half_ago - *pixel).norm() / h);
-    depths.push_back(x_cam.norm());
+    flows_.push_back((*half_ago - *pixel).norm() / h);
+    depths_.push_back(x_cam.norm());
   }
-  if (!depths.empty()) typical_depth_m_ = median(depths);
-  return median(flows);
+  if (!depths_.empty()) typical_depth_m_ = median(depths_);
+  return median(flows_);
 }
 
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
@@ -289,7 +293,7 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
         alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_, covariance});
     return {{r.information, r.vector}, static_cast<int>(samples_.size()),
             r.matched_samples,         std::sqrt(r.mean_square_px2),
-            r.matched_events,          r.wrong_polarity};
+            r.matched_events,          r.wrong_polarity,            r.captured};
   }
   const Matrix6d prior = covariance.ldlt().solve(Matrix6d::Identity());
   const AlignmentProblem problem{

@@ -152,6 +152,7 @@ class Tracker {
   EventAlignment alignment_;
   std::vector<AlignmentPoint> points_;  ///< of the exponential field
   std::vector<ContourSample> samples_;  ///< of the events' alignment
+  std::vector<double> flows_, depths_;  ///< of the points, px/s and m
   double typical_depth_m_ = 3;
   EventFront::Counts counted_;
   double events_time_s_ = 0;

@@ -22,6 +22,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   bench->require_subcommand(1);
   add_bench_fusion(*bench, run);
   add_bench_calibration(*bench, run);
+  add_bench_capture(*bench, run);
   add_bench_faults(*bench, run);
 }
 

@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kUnknownSpeed_m_s = 0.5;  // of a start pose given without velocity
 constexpr double kUnknownRate_rad_s = 0.5;
+constexpr double kGivenPosition_m = 0.03,
+                 kGivenRotation_rad = 0.01;   // sigma of a pose given by hand, per axis
 constexpr TimeNs kDifference = 5 * kNsPerMs;  // velocity from poses at least so far to both sides
 
 /// First pose of the trajectory inside the recording, velocities from its neighbours.
@@ -65,13 +67,9 @@ Expected<StartState> from_text(const std::string& text_in, const Recording& reco
   return start;
 }
 
-void widen(const Recording& recording, FusionConfig* config) {
-  if (recording.initial_pose) {
-    config->start_position_sigma_m =
-        std::max(config->start_position_sigma_m, recording.initial_pose->sigma_p_m);
-    config->start_rotation_sigma_rad =
-        std::max(config->start_rotation_sigma_rad, recording.initial_pose->sigma_q_deg * M_PI / 180);
-  }
+void widen(double position_m, double rotation_rad, FusionConfig* config) {
+  config->start_position_sigma_m = std::max(config->start_position_sigma_m, position_m);
+  config->start_rotation_sigma_rad = std::max(config->start_rotation_sigma_rad, rotation_rad);
   config->start_velocity_sigma_m_s = std::max(config->start_velocity_sigma_m_s, kUnknownSpeed_m_s);
   config->start_angular_rate_sigma_rad_s =
       std::max(config->start_angular_rate_sigma_rad_s, kUnknownRate_rad_s);
@@ -91,7 +89,7 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
     if (!recording.initial_pose)
       return Error{"--init", "the recording has neither ground truth nor initial_pose",
                    "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
-    widen(recording, config);
+    widen(recording.initial_pose->sigma_p_m, recording.initial_pose->sigma_q_deg * M_PI / 180, config);
     StartState start;
     start.t = std::max(recording.initial_pose->t, recording.first_ns);
     start.T_map_body = recording.initial_pose->T_map_body;
@@ -109,7 +107,7 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
   if (start->t > recording.last_ns)
     return Error{"--init", "the start lies after the recording's end",
                  "give a time on the recording's clock after @"};
-  widen(recording, config);
+  widen(kGivenPosition_m, kGivenRotation_rad, config);
   return start;
 }
 

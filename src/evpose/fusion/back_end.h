@@ -78,8 +78,12 @@ class BackEnd {
   explicit BackEnd(const Motion& motion) : motion_(motion) {}
   virtual ~BackEnd() = default;
 
-  /// `angular_rate_body` is used by constant velocity only.
-  virtual void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) = 0;
+  /// Begins, or begins anew.
+  virtual void start(const FusionState& first) = 0;
+  /// With the configured uncertainty. `angular_rate_body` is used by constant velocity only.
+  void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) {
+    start(motion_.start(t, nav, angular_rate_body));
+  }
   /// IMU model: one step between two samples; a.t must be the state's time. Both in the body frame.
   /// Suspect: the samples, or the time between them, are not to be relied on.
   virtual void predict(const ImuSample& a, const ImuSample& b, bool suspect) = 0;

@@ -29,8 +29,8 @@ void correct(FusionState& state, const PoseInformation& m) {
   symmetrise(state.covariance);
 }
 
-void Ekf::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) {
-  state_ = motion().start(t, nav, angular_rate_body);
+void Ekf::start(const FusionState& first) {
+  state_ = first;
   calibration_ = {};
   cross_.setZero();
   spread_.setZero();
@@ -38,9 +38,9 @@ void Ekf::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_ra
   if (config_.rotation)
     spread_.diagonal().tail<3>().setConstant(config_.start_rotation_sigma_rad *
                                              config_.start_rotation_sigma_rad);
-  motion_mean_ << nav.velocity, angular_rate_body;
+  motion_mean_ << first.nav.velocity, first.angular_rate;
   motion_square_ = motion_mean_.cwiseAbs2();
-  watched_ = t;
+  watched_ = first.t;
 }
 
 void Ekf::predict(const ImuSample& a, const ImuSample& b, bool suspect) {

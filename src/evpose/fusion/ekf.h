@@ -17,7 +17,8 @@ class Ekf : public BackEnd {
   explicit Ekf(const Motion& motion, const CalibrationConfig& calibration = {}, const Pose& T_body_cam = {})
       : BackEnd(motion), config_(calibration), camera_in_body_(T_body_cam.p) {}
 
-  void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) override;
+  using BackEnd::start;
+  void start(const FusionState& first) override;
   void predict(const ImuSample& a, const ImuSample& b, bool suspect) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement) override;

@@ -16,8 +16,8 @@ void describe(ConfigTable& table, WindowConfig& c) {
 Graph::Graph(const Motion& motion, const WindowConfig& config)
     : BackEnd(motion), config_(config), window_(motion.gravity_map()), since_({0, 0, 0}, {0, 0, 0}) {}
 
-void Graph::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) {
-  state_ = motion().start(t, nav, angular_rate_body);
+void Graph::start(const FusionState& first) {
+  state_ = first;
   window_.start(state_);
   since_ = Preintegration(state_.gyro_bias, state_.accel_bias);
   waiting_ = 0;

@@ -12,7 +12,8 @@ class Graph : public BackEnd {
  public:
   Graph(const Motion& motion, const WindowConfig& config);
 
-  void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) override;
+  using BackEnd::start;
+  void start(const FusionState& first) override;
   void predict(const ImuSample& a, const ImuSample& b, bool suspect) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement) override;

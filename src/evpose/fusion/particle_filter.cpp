@@ -16,9 +16,9 @@ void describe(ConfigTable& table, ParticleConfig& c) {
 ParticleFilter::ParticleFilter(const Motion& motion, const ParticleConfig& config)
     : BackEnd(motion), sample_(6, config.particles), weights_(static_cast<std::size_t>(config.particles)) {}
 
-void ParticleFilter::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) {
+void ParticleFilter::start(const FusionState& first) {
   random_.seed(1);
-  state_ = motion().start(t, nav, angular_rate_body);
+  state_ = first;
 }
 
 void ParticleFilter::draw() {

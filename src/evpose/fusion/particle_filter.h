@@ -18,7 +18,8 @@ class ParticleFilter : public BackEnd {
  public:
   ParticleFilter(const Motion& motion, const ParticleConfig& config);
 
-  void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) override;
+  using BackEnd::start;
+  void start(const FusionState& first) override;
   void predict(const ImuSample& a, const ImuSample& b, bool suspect) override {
     motion().step(state_, a, b, suspect);
   }

@@ -24,6 +24,11 @@ ImuIncrement integrate(const ImuSample& a, const ImuSample& b, const Eigen::Vect
   return out;
 }
 
+ImuIncrement joined(const ImuIncrement& a, const ImuIncrement& b) {
+  return {a.dt_s + b.dt_s, (a.dq * b.dq).normalized(), a.dv + a.dq * b.dv,
+          a.dp + a.dv * b.dt_s + a.dq * b.dp};
+}
+
 NavState strapdown(const NavState& state, const ImuSample& a, const ImuSample& b,
                    const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias,
                    const Eigen::Vector3d& gravity_map) {

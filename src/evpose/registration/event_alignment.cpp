@@ -212,6 +212,7 @@ EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
   sum_events(p, &result);
   learn_contrast(p);
   weigh_clusters(p, &result);
+  result.slope = slope_.weight < kTelling ? 0 : slope_.value();
   result.captured = captured();
   return result;
 }

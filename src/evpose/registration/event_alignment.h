@@ -51,6 +51,9 @@ struct ContourSample {
   double map_sigma_px = 0;      ///< the map's error across the contour, in the image
   double speed_sigma_px_s = 0;  ///< error of the speed, 1 sigma
   std::uint32_t piece = 0;      ///< of the contour, for what is learnt about it
+  std::uint32_t point = 0;      ///< of the map
+  double flow_px_s = 0;         ///< velocity in the image, in any direction
+  double depth_m = 0;           ///< distance from the camera
 };
 
 struct EventAlignmentProblem {
@@ -66,6 +69,7 @@ struct EventAlignmentResult {
   Vector6d vector = Vector6d::Zero();       ///< information * offset
   int matched_samples = 0;                  ///< with at least one event in the gate
   int matched_events = 0;
+  double slope = 1;  ///< how the mean distance answers to an offset: 0 for events spread evenly, or too few
   bool captured = true;        ///< the events in the gate gather at the contours
   int wrong_polarity = 0;      ///< events near contours that were left out for their polarity
   double mean_square_px2 = 0;  ///< weighted, of the signed distances
@@ -86,6 +90,8 @@ class EventAlignment {
   EventAlignment(ImageSize size, const EventAlignmentConfig& config, std::uint32_t pieces = 1);
   EventAlignmentResult align(const EventAlignmentProblem& problem);
 
+  /// The pose comes from elsewhere: how well the events gathered at the contours does not count any more.
+  void forget() { slope_ = {}; }
   const ContrastMemory& contrast() const { return contrast_; }
 
  private:

@@ -28,7 +28,10 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
   const double silent_s = to_seconds(e.t - last_accepted_);
   Health next = Health::tracking;
   std::string why = any_accepted_ ? "contours and events agree" : "";
-  if (!(e.sigma_px <= config_.lost_sigma_px)) {
+  if (e.searching) {
+    next = any_accepted_ ? Health::lost : Health::initialising;
+    why = e.refused;
+  } else if (!(e.sigma_px <= config_.lost_sigma_px)) {
     next = Health::lost;
     why = text("pose uncertain by ", e.sigma_px, " px, beyond the capture range of ", config_.lost_sigma_px,
                " px");

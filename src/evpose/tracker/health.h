@@ -25,7 +25,8 @@ void describe(ConfigTable& table, HealthConfig& config);
 struct Evidence {
   TimeNs t = 0;
   bool accepted = false;
-  std::string refused;  ///< why not accepted
+  std::string refused;     ///< why not accepted
+  bool searching = false;  ///< the pose is searched: it is not known
   double sigma_px = 0;  ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
   std::string fault;    ///< what is wrong with the data, if anything
 };

@@ -67,6 +67,7 @@ void describe(ConfigTable& table, TrackerConfig& c) {
   table.group("exponential", c.exponential);
   table.group("fusion", c.fusion);
   table.group("imu", c.imu);
+  table.group("capture", c.capture);
   table.group("health", c.health);
 }
 
@@ -98,6 +99,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       visible_(index_, *setup_.camera, spread(config)),
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
+      capture_(config.capture, index_, pieces_, *setup_.camera, setup_.T_body_cam,
+               fusion_->motion().gravity_map()),
       health_(config.health),
       imu_watch_(config.imu),
       given_q_body_cam_(setup.T_body_cam.q),
@@ -107,6 +110,9 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       alignment_(setup_.camera->size(), config.alignment, pieces_.count) {
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
+  before_search_ = fusion_->state();
+  if (config.capture.on && sigma_px() > config.capture.from_px)
+    capture_.begin(start.t, fusion_->state().nav, fusion_->state().pose_covariance());
   next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
 }
 
@@ -195,10 +201,14 @@ void Tracker::tell_states() {
 }
 
 void Tracker::predict(TimeNs t) {
-  if (setup_.motion == MotionModel::constant_velocity) return fusion_->predict(t);
+  const TimeNs from = fusion_->state().t;
+  moved_ = {};
+  if (setup_.motion == MotionModel::constant_velocity) {
+    moved_.dt_s = to_seconds(t - from);
+    return fusion_->predict(t);
+  }
   // Make the first sample stand at the state's time, then step from sample to sample; the last step ends at
   // t.
-  const TimeNs from = fusion_->state().t;
   if (t == from) return;
   if (imu_.front().sample.t > from) {
     CheckedImu first = imu_.front();
@@ -208,79 +218,75 @@ void Tracker::predict(TimeNs t) {
   while (imu_.size() >= 2 && imu_[1].sample.t <= from) imu_.pop_front();
   if (imu_.front().sample.t < from)
     imu_.front().sample = interpolate(imu_.front().sample, imu_[1].sample, from);
+  const auto step = [this](const CheckedImu& a, const CheckedImu& b) {
+    const FusionState& state = fusion_->state();
+    if (capture_.searching() || verify_until_ != 0)
+      moved_ = joined(moved_, integrate(a.sample, b.sample, state.gyro_bias, state.accel_bias));
+    fusion_->predict(a.sample, b.sample, a.suspect || b.suspect);
+  };
   while (imu_[1].sample.t < t) {
-    fusion_->predict(imu_[0].sample, imu_[1].sample, imu_[0].suspect || imu_[1].suspect);
+    step(imu_[0], imu_[1]);
     imu_.pop_front();
   }
   const CheckedImu last{interpolate(imu_[0].sample, imu_[1].sample, t), imu_[1].suspect};
-  fusion_->predict(imu_[0].sample, last.sample, imu_[0].suspect || last.suspect);
+  step(imu_[0], last);
   imu_.front() = last;
 }
 
+/// Uncertainty of the pose as image motion of the typical point, 1 sigma, in the weakest direction.
+double Tracker::sigma_px() const {
+  const Matrix6d covariance = fusion_->state().pose_covariance();
+  const auto largest = [](const Eigen::Matrix3d& m) {
+    return std::sqrt(
+        std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
+  };
+  return setup_.camera->focal_px() * std::max(largest(covariance.topLeftCorner<3, 3>()) / typical_depth_m_,
+                                              largest(covariance.bottomRightCorner<3, 3>()));
+}
+
+/// One update's part of the search for the pose; when it is found, tracking begins there.
+void Tracker::search(TimeNs t) {
+  const auto found = capture_.take(t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate);
+  if (!found) return;
+  FusionState state = fusion_->motion().start(fusion_->state().t, found->nav, found->angular_rate);
+  state.gyro_bias = fusion_->state().gyro_bias;
+  state.accel_bias = fusion_->state().accel_bias;
+  if (setup_.motion == MotionModel::constant_velocity) state.gyro_bias = -found->angular_rate;
+  const auto widen = [&state](int at, double sigma) {
+    state.covariance.diagonal().segment<3>(at).setConstant(sigma * sigma);
+  };
+  widen(error_state::kP, config_.capture.found_position_sigma_m);
+  widen(error_state::kPhi, config_.capture.found_rotation_sigma_rad);
+  widen(error_state::kV, config_.capture.found_velocity_sigma_m_s);
+  fusion_->start(state);
+  alignment_.forget();
+  verify_until_ = t + from_seconds(config_.capture.verify_s);
+}
+
 double Tracker::plan_points(const Pose& T_map_body, double span_s) {
-  const Pose T_body_cam = setup_.T_body_cam;
-  const Eigen::Matrix3d R_body_map = T_map_body.rotation().transpose();
-  const Eigen::Matrix3d R_cam_body = T_body_cam.rotation().transpose();
-  const Eigen::Vector3d rate_body = fusion_->state().angular_rate;
-  // The pose half the span and the whole span ago, by the predicted twist.
-  Eigen::Matrix3d R[3];
-  Eigen::Vector3d offset[3];  // of the map's anchor, camera frame
-  for (int k = 0; k < 3; ++k) {
-    const double age = 0.5 * k * span_s;
-    const Pose past{T_map_body.q * so3::exp(-age * rate_body),
-                    T_map_body.p - age * fusion_->state().nav.velocity};
-    const Pose T_cam_map = (past * T_body_cam).inverse();
-    R[k] = T_cam_map.rotation();
-    offset[k] = T_cam_map * setup_.map->anchor;
-  }
-  const Eigen::Matrix3d R_body_cam = T_body_cam.rotation();
-  const Camera& camera = *setup_.camera;
-  const ContourMap& map = *setup_.map;
-  const double h = 0.5 * span_s;
-  const Eigen::Matrix3d velocity_covariance =
-      fusion_->state().covariance.block<3, 3>(error_state::kV, error_state::kV);
-  const double rate_variance =
-      fusion_->state().covariance.block<3, 3>(error_state::kBg, error_state::kBg).trace() / 3;
+  const FusionState& state = fusion_->state();
+  const auto& chosen = visible_.choose(T_map_body * setup_.T_body_cam);
+  const ContourView view{*setup_.map, pieces_, *setup_.camera, setup_.T_body_cam,
+                         config_.alignment.map_sigma_m};
+  const BodyMotion motion{T_map_body, state.nav.velocity, state.angular_rate};
+  project_contours(view, chosen, motion, span_s, samples_);
+  const Eigen::Matrix3d velocity_covariance = state.covariance.block<3, 3>(error_state::kV, error_state::kV);
+  const double rate_variance = state.covariance.block<3, 3>(error_state::kBg, error_state::kBg).trace() / 3;
   points_.clear();
-  samples_.clear();
   flows_.clear();
   depths_.clear();
-  for (const std::uint32_t i : visible_.choose(T_map_body * T_body_cam)) {
-    const Eigen::Vector3d position = map.points[i].position.cast<double>();  // from the anchor
-    const Eigen::Vector3d x_cam = R[0] * position + offset[0];
-    Matrix23d J;
-    const auto pixel = camera.project(x_cam, &J);
-    const auto half_ago = camera.project(R[1] * position + offset[1]),
-               ago = camera.project(R[2] * position + offset[2]);
-    if (!pixel || !half_ago || !ago) continue;
-    const Eigen::Vector2d along = J * (R[0] * map.points[i].tangent.cast<double>());
-    if (!(along.norm() > 0)) continue;
-    const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
-    // n.(u(t - a) - u(t)) = -s1 a + s2 a^2 through the two past projections.
-    const double d1 = normal.dot(*half_ago - *pixel), d2 = normal.dot(*ago - *pixel);
-    const double speed = (d2 - 4 * d1) / (2 * h);
-    if (config_.field == FieldKind::events) {
-      ContourSample s{*pixel, normal, speed, (d2 - 2 * d1) / (2 * h * h), {}};
-      const Eigen::RowVector3d across = normal.transpose() * J;
-      const Eigen::RowVector3d A = across * R_cam_body;
-      const Eigen::Vector3d x_body = R_body_cam * x_cam + T_body_cam.p;
-      s.jacobian.head<3>() = (A * R_body_map).transpose();
-      s.jacobian.tail<3>() = x_body.cross(A.transpose());  // -(A hat(x))^T
-      const double sigma_m = map.points[i].sigma > 0 ? map.points[i].sigma : config_.alignment.map_sigma_m;
-      s.map_sigma_px = sigma_m * across.norm();
-      s.speed_sigma_px_s =
-          std::sqrt(std::max(0.0, s.jacobian.head<3>().dot(velocity_covariance * s.jacobian.head<3>()) +
-                                      rate_variance * s.jacobian.tail<3>().squaredNorm()));
-      s.piece = pieces_.of_point[i];
-      samples_.push_back(s);
-    } else {
+  for (ContourSample& s : samples_) {
+    const Eigen::Vector3d by_position = s.jacobian.head<3>();
+    s.speed_sigma_px_s = std::sqrt(std::max(0.0, by_position.dot(velocity_covariance * by_position) +
+                                                     rate_variance * s.jacobian.tail<3>().squaredNorm()));
+    if (config_.field == FieldKind::exponential) {
       const RegistrationConfig& c = config_.exponential;
-      const double decay_s = std::clamp(c.decay_px / std::max(std::abs(speed), 1e-9), c.decay_min_s,
+      const double decay_s = std::clamp(c.decay_px / std::max(std::abs(s.speed_px_s), 1e-9), c.decay_min_s,
                                         std::max(c.decay_min_s, c.decay_max_s));
-      points_.push_back({map.position(i), 1e6 * decay_s});
+      points_.push_back({setup_.map->position(s.point), 1e6 * decay_s});
     }
-    flows_.push_back((*half_ago - *pixel).norm() / h);
-    depths_.push_back(x_cam.norm());
+    flows_.push_back(s.flow_px_s);
+    depths_.push_back(s.depth_m);
   }
   if (!depths_.empty()) typical_depth_m_ = median(depths_);
   return median(flows_);
@@ -291,9 +297,14 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
   if (config_.field == FieldKind::events) {
     const EventAlignmentResult r =
         alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_, covariance});
-    return {{r.information, r.vector}, static_cast<int>(samples_.size()),
-            r.matched_samples,         std::sqrt(r.mean_square_px2),
-            r.matched_events,          r.wrong_polarity,            r.captured};
+    return {{r.information, r.vector},
+            static_cast<int>(samples_.size()),
+            r.matched_samples,
+            std::sqrt(r.mean_square_px2),
+            r.matched_events,
+            r.wrong_polarity,
+            r.captured,
+            r.slope};
   }
   const Matrix6d prior = covariance.ldlt().solve(Matrix6d::Identity());
   const AlignmentProblem problem{
@@ -321,19 +332,25 @@ Update Tracker::update(TimeNs t) {
   const bool blind = setup_.motion == MotionModel::imu &&
                      bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
   predict(until);
+  if (capture_.searching())
+    search(t);
+  else if (verify_until_ != 0)
+    capture_.follow(moved_);
   const Pose predicted = fusion_->state().nav.T_map_body;
   const double t1 = now();
 
   const double flow_px_s = plan_points(predicted, span_s);
   const double t2 = now();
 
-  const Registration stpe = register_events(t, predicted, span_s);
+  const bool searching = capture_.searching();
+  const Registration stpe = searching ? Registration{} : register_events(t, predicted, span_s);
   const double t3 = now();
 
   Evidence evidence;
   evidence.t = t;
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
-  evidence.refused = refusal(stpe, out.innovation);
+  evidence.searching = searching || t < verify_until_;
+  evidence.refused = searching ? "searching for the pose" : refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
   evidence.fault = blind ? "no IMU samples" : imu_watch_.fault(t);
   if (evidence.fault.empty() && !stpe.captured) evidence.fault = "events do not gather at the contours";
@@ -341,14 +358,30 @@ Update Tracker::update(TimeNs t) {
   setup_.T_body_cam.q = fusion_->calibration().turn * given_q_body_cam_;
 
   const Matrix6d covariance = fusion_->state().pose_covariance();
-  const auto largest = [](const Eigen::Matrix3d& m) {
-    return std::sqrt(
-        std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
-  };
-  evidence.sigma_px =
-      setup_.camera->focal_px() * std::max(largest(covariance.topLeftCorner<3, 3>()) / typical_depth_m_,
-                                           largest(covariance.bottomRightCorner<3, 3>()));
+  evidence.sigma_px = sigma_px();
   out.health = health_.judge(evidence, &out.reason);
+  uncaptured_s_ = stpe.captured ? 0 : uncaptured_s_ + span_s;
+  if (verify_until_ != 0 && t >= verify_until_) {
+    verify_until_ = 0;
+    if (stpe.slope < config_.capture.least_slope) {
+      // What a wrong pose has taught goes with it.
+      FusionState state = fusion_->state();
+      state.gyro_bias = before_search_.gyro_bias;
+      state.accel_bias = before_search_.accel_bias;
+      fusion_->start(state);
+      capture_.resume(t);
+    }
+  }
+  const bool gone =
+      (out.health == Health::lost && verify_until_ == 0) || uncaptured_s_ > config_.capture.patience_s;
+  if (config_.capture.on && !capture_.searching() && gone) {
+    Matrix6d around = covariance;
+    around.diagonal().head<3>().array() += std::pow(config_.capture.position_sigma_m, 2);
+    around.diagonal().tail<3>().array() += std::pow(config_.capture.rotation_sigma_rad, 2);
+    before_search_ = fusion_->state();
+    capture_.begin(t, fusion_->state().nav, around);
+    uncaptured_s_ = 0;
+  }
 
   const FusionState& state = fusion_->state();
   out.t = state.t;

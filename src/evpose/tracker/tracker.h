@@ -16,6 +16,8 @@
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/event_alignment.h"
 #include "evpose/registration/registration.h"
+#include "evpose/tracker/capture.h"
+#include "evpose/tracker/contour_view.h"
 #include "evpose/tracker/health.h"
 #include "evpose/tracker/imu_watch.h"
 #include "evpose/tracker/update.h"
@@ -32,6 +34,7 @@ struct TrackerConfig {
   RegistrationConfig exponential;  ///< of field == exponential
   FusionConfig fusion;
   ImuWatchConfig imu;
+  CaptureConfig capture;
   HealthConfig health;
 };
 void describe(ConfigTable& table, TrackerConfig& config);
@@ -110,12 +113,15 @@ class Tracker {
   bool imu_reaches(TimeNs t) const;
   void tell_states();
   void predict(TimeNs t);
+  double sigma_px() const;
+  void search(TimeNs t);
   struct Registration {
     PoseInformation measurement;
     int points = 0, matched = 0;
     double residual = 0;
     int events = 0, wrong_polarity = 0;
     bool captured = true;
+    double slope = 1;
   };
   /// Fills points_ or samples_ from the visible set; the median image motion, px/s.
   double plan_points(const Pose& T_map_body, double span_s);
@@ -133,6 +139,7 @@ class Tracker {
   VisibleSet visible_;
   EventFront front_;
   std::unique_ptr<BackEnd> fusion_;
+  Capture capture_;
   HealthMonitor health_;
   std::function<void(const Update&)> callback_;
   std::function<void(const FusionState&)> state_callback_;
@@ -154,6 +161,10 @@ class Tracker {
   std::vector<ContourSample> samples_;  ///< of the events' alignment
   std::vector<double> flows_, depths_;  ///< of the points, px/s and m
   double typical_depth_m_ = 3;
+  ImuIncrement moved_;  ///< over the last prediction, while the pose is searched
+  FusionState before_search_;
+  TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
+  double uncaptured_s_ = 0;  ///< for how long the events have not gathered at the contours
   EventFront::Counts counted_;
   double events_time_s_ = 0;
 };

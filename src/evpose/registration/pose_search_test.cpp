@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/pose_search.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace evpose {
+namespace {
+
+constexpr ImageSize kSize{320, 240};
+
+FrontEvent event_at(double x, double y) {
+  FrontEvent e{};
+  e.x = static_cast<std::uint16_t>(std::lround(x));
+  e.y = static_cast<std::uint16_t>(std::lround(y) & 0x7FFF);
+  return e;
+}
+
+TEST(EdgeField, DistanceIsThatOfTheLineAndGrowsAcrossIt) {
+  EdgeField field(kSize);
+  std::vector<FrontEvent> events;
+  for (int y = 20; y < 220; ++y) events.push_back(event_at(150, y));
+  field.build(events);
+  const int upright = EdgeField::direction(0, 1);
+  for (double x : {120.0, 140.5, 150.0, 163.25}) {
+    const EdgeField::Sample s = field.sample(x, 120, upright);
+    EXPECT_NEAR(s.distance, std::abs(x - 150), 1e-4);
+    EXPECT_NEAR(s.dy, 0, 1e-4);
+    if (x < 149) EXPECT_NEAR(s.dx, -1, 1e-4);
+    if (x > 151) EXPECT_NEAR(s.dx, 1, 1e-4);
+  }
+}
+
+TEST(EdgeField, LinesOfAnotherDirectionAreNotSeen) {
+  EdgeField field(kSize);
+  std::vector<FrontEvent> events;
+  for (int y = 20; y < 220; ++y) events.push_back(event_at(150, y));
+  field.build(events);
+  EXPECT_EQ(field.sample(150, 120, EdgeField::direction(1, 0)).distance, EdgeField::kReach_px);
+}
+
+TEST(EdgeField, DirectionOfALineHasNoSign) {
+  for (double a = 0; a < 6.3; a += 0.1) {
+    const double x = std::cos(a), y = std::sin(a);
+    EXPECT_EQ(EdgeField::direction(x, y), EdgeField::direction(-x, -y)) << a;
+  }
+}
+
+TEST(EdgeField, OddsAreAboveOneOnALoneEdgeAndOneInTexture) {
+  EdgeField field(kSize);
+  std::vector<FrontEvent> events;
+  for (int y = 10; y < 230; ++y) {
+    events.push_back(event_at(60, y));
+    for (int x = 200; x < 310; x += 8) events.push_back(event_at(x, y));
+  }
+  field.build(events);
+  const int upright = EdgeField::direction(0, 1);
+  EXPECT_GT(field.odds(60, 120, upright, 1), 10);
+  double mean = 0;
+  for (int x = 240; x < 272; ++x) mean += field.odds(x, 120, upright, 1) / 32;
+  EXPECT_NEAR(mean, 1, 0.1);
+}
+
+/// A cloud of boxes in front of the camera, whose edges are both the map and, projected, the events.
+class PoseSearchLaws : public ::testing::Test {
+ protected:
+  PoseSearchLaws() : field_(kSize) {
+    camera_ = std::move(make_camera({250, 250, 159.5, 119.5, "none", {}, kSize})).value();
+    std::mt19937 random(3);
+    const auto uniform = [&](double low, double high) {
+      return low + (high - low) * static_cast<double>(random()) / 4294967296.0;
+    };
+    for (int box = 0; box < 12; ++box) {
+      const Eigen::Vector3d corner(uniform(-1.6, 1.4), uniform(-1.2, 1), uniform(2, 4));
+      for (int axis = 0; axis < 3; ++axis)
+        for (int k = 0; k < 4; ++k) {
+          Eigen::Vector3d from = corner, along = Eigen::Vector3d::Zero();
+          from[(axis + 1) % 3] += 0.5 * (k & 1);
+          from[(axis + 2) % 3] += 0.5 * (k >> 1);
+          along[axis] = 1;
+          for (double s = 0; s < 0.5; s += 0.005) lines_.push_back({from + s * along, along});
+        }
+    }
+    for (std::size_t i = 0; i < lines_.size(); i += 6) points_.push_back(lines_[i]);
+    field_.build(events(Pose{}));
+  }
+  std::vector<FrontEvent> events(const Pose& T_map_cam) const {
+    std::vector<FrontEvent> out;
+    for (const SearchPoint& p : lines_) {
+      const auto u = camera_->project(T_map_cam.inverse() * p.position);
+      if (u && kSize.contains(*u)) out.push_back(event_at(u->x(), u->y()));
+    }
+    return out;
+  }
+  SearchView view() const { return {field_, *camera_, T_body_cam_, points_}; }
+
+  EdgeField field_;
+  std::shared_ptr<const Camera> camera_;
+  Pose T_body_cam_;
+  std::vector<SearchPoint> lines_, points_;
+};
+
+TEST_F(PoseSearchLaws, TheTruePoseScoresBest) {
+  const PoseSearch search{PoseSearchConfig{}};
+  const double best = search.score(view(), Pose{}, 1);
+  for (int axis = 0; axis < 6; ++axis) {
+    Vector6d d = Vector6d::Zero();
+    d(axis) = 0.04;
+    EXPECT_GT(best, search.score(view(), Pose{}.plus(d), 1) + 0.2) << axis;
+  }
+}
+
+TEST_F(PoseSearchLaws, RefiningReturnsToTheTruePose) {
+  const PoseSearch search{PoseSearchConfig{}};
+  Vector6d d;
+  d << 0.02, -0.03, 0.02, 0.01, 0.01, -0.015;
+  const PoseGuess refined = search.refine(view(), Pose{}.plus(d), Matrix6d::Identity(), 12);
+  EXPECT_LT(refined.T_map_body.p.norm(), 0.006);
+  EXPECT_LT(so3::log(refined.T_map_body.q).norm(), 0.003);
+}
+
+TEST_F(PoseSearchLaws, ThePoseIsFoundFromAWidePrior) {
+  const PoseSearch search{PoseSearchConfig{}};
+  Vector6d d, sigma;
+  d << 0.1, -0.1, 0.08, 0.03, -0.04, 0.02;
+  sigma << 0.1, 0.1, 0.1, 0.04, 0.04, 0.04;
+  const Matrix6d covariance = sigma.cwiseAbs2().asDiagonal();
+  const auto found = search.search(view(), Pose{}.plus(d), covariance, 1);
+  ASSERT_GE(found.size(), 2u);
+  EXPECT_LT(found[0].T_map_body.p.norm(), 0.01);
+  EXPECT_LT(so3::log(found[0].T_map_body.q).norm(), 0.005);
+  EXPECT_GT(found[0].score, found[1].score);
+}
+
+TEST_F(PoseSearchLaws, TheSameSeedGivesTheSamePoses) {
+  const PoseSearch search{PoseSearchConfig{}};
+  const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
+  const auto a = search.search(view(), Pose{}, covariance, 5),
+             b = search.search(view(), Pose{}, covariance, 5);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].T_map_body.p, b[i].T_map_body.p);
+}
+
+}  // namespace
+}  // namespace evpose

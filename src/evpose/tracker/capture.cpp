@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/tracker/capture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kPositionSigma_m = 4e-3, kRotationSigma_rad = 1e-3;  // of a pose that its events confirm
+constexpr double kGates_px[] = {3, 1.5, 0.8, 0.5};
+constexpr int kSteps = 3;  // at each gate
+constexpr double kSharpen_s = 0.01;
+constexpr double kSharpenSigma_m = 0.02, kSharpenSigma_rad = 0.01;
+constexpr double kStride_px = 8, kMargin_px = 40;
+constexpr double kThinShare = 0.25;
+constexpr std::size_t kFewestEvents = 500;  // of a slice: nothing moves
+constexpr int kPoints = 700;
+constexpr double kCloseStride_px = 6;
+constexpr int kClosePoints = 2500;
+constexpr int kFlowCell_px = 16;
+constexpr double kWidening = 1.5;                  // of the prior, from search to search
+constexpr int kSameWidth = 3, kMostWidenings = 2;  // searches of the first width, then wider ones
+constexpr double kBlunt = 5;                       // times these for one that they do not
+constexpr double kNewest = 0.4;                    // weight of the newest slice in the mean slope
+constexpr double kOne_m = 0.005, kOne_rad = 0.002, kOne_m_s = 0.1;
+constexpr double kSame_m = 0.02, kSame_rad = 0.007;  // candidates nearer than this are one
+
+}  // namespace
+
+void describe(ConfigTable& table, CaptureConfig& c) {
+  table.add("on", c.on, "search the pose when it starts or becomes unsure");
+  table.add("from_px", c.from_px, "px", "start poses less sure than this are searched", {0, 1e4});
+  table.add("slice_events_per_column", c.slice_events_per_column, "",
+            "events of a slice over the image's width", {0.1, 1000});
+  table.add("short_slice_s", c.short_slice_s, "s", "... or with a quarter of them after this", {1e-3, 1});
+  table.add("longest_slice_s", c.longest_slice_s, "s", "a slice ends after this", {1e-3, 1});
+  table.add("gap_s", c.gap_s, "s", "between slices", {0, 1});
+  table.add("least_slices", c.least_slices, "", "looked at before a pose is believed", {1, 100});
+  table.add("most_slices", c.most_slices, "", "... and at most", {1, 1000});
+  table.add("sharpened", c.sharpened, "", "poses whose events are looked at one by one", {1, 1000});
+  table.add("least_slope", c.least_slope, "", "how much the events of a pose that is believed gather",
+            {0, 1});
+  table.add("least_lead", c.least_lead, "", "... and more than those of the next", {0, 1});
+  table.add("velocity_sigma_m_s", c.velocity_sigma_m_s, "m/s", "when a search begins", {0.01, 100});
+  table.add("position_sigma_m", c.position_sigma_m, "m", "around the last pose when it was lost", {1e-3, 10});
+  table.add("rotation_sigma_rad", c.rotation_sigma_rad, "rad", "around the last pose when it was lost",
+            {1e-4, 1});
+  table.add("verify_s", c.verify_s, "s", "a pose found is watched for so long before it is called tracking",
+            {0, 10});
+  table.add("patience_s", c.patience_s, "s", "events that do not gather at the contours for so long: search",
+            {0, 100});
+  table.add("found_position_sigma_m", c.found_position_sigma_m, "m", "of a pose found", {1e-4, 1});
+  table.add("found_rotation_sigma_rad", c.found_rotation_sigma_rad, "rad", "of a pose found", {1e-5, 1});
+  table.add("found_velocity_sigma_m_s", c.found_velocity_sigma_m_s, "m/s", "of a pose found", {1e-3, 10});
+  table.group("search", c.search);
+}
+
+Capture::Capture(const CaptureConfig& config, const ContourIndex& index, const ContourPieces& pieces,
+                 const Camera& camera, const Pose& T_body_cam, const Eigen::Vector3d& gravity_map)
+    : config_(config),
+      index_(index),
+      pieces_(pieces),
+      camera_(camera),
+      T_body_cam_(T_body_cam),
+      gravity_map_(gravity_map),
+      has_imu_(!gravity_map.isZero()),
+      search_(config.search) {}
+
+void Capture::begin(TimeNs t, const NavState& state, const Matrix6d& covariance) {
+  if (!field_) {
+    field_ = std::make_unique<EdgeField>(camera_.size());
+    field_->set_spreads(static_cast<float>(config_.search.coarse_px),
+                        static_cast<float>(config_.search.fine_px));
+    VisibleSetConfig view;
+    view.stride_px = kStride_px;
+    view.margin_px = kMargin_px;
+    view.budget = kPoints;
+    view.refresh_px = 0;
+    visible_ = std::make_unique<VisibleSet>(index_, camera_, view);
+    VisibleSetConfig close;
+    close.stride_px = kCloseStride_px;
+    close.budget = kClosePoints;
+    all_visible_ = std::make_unique<VisibleSet>(index_, camera_, close);
+    for (const double gate_px : kGates_px) {
+      EventAlignmentConfig stage;
+      stage.gate_px = stage.widest_gate_px = stage.capture_gate_px = gate_px;
+      stage.count_px = 0.1;
+      stage.polarity = stage.honest_slope = false;
+      stages_.push_back(std::make_unique<EventAlignment>(camera_.size(), stage, pieces_.count));
+    }
+  }
+  searching_ = true;
+  prior_ = state;
+  prior_covariance_ = covariance;
+  candidates_.clear();
+  slice_.clear();
+  slice_begin_ = t;
+  last_slice_ = 0;
+  since_ = {};
+  elapsed_s_ = 0;
+  slices_ = 0;
+  searches_ = 0;
+}
+
+void Capture::resume(TimeNs t) {
+  searching_ = true;
+  slice_begin_ = t;
+  candidates_.clear();
+  slice_.clear();
+  slices_ = 0;
+  ++searches_;
+}
+
+void Capture::move(Candidate& c, const ImuIncrement& m) const {
+  const double dt = m.dt_s;
+  NavState& nav = c.nav;
+  nav.T_map_body.p += nav.velocity * dt + 0.5 * dt * dt * gravity_map_ + nav.T_map_body.q * m.dp;
+  nav.velocity += dt * gravity_map_ + nav.T_map_body.q * m.dv;
+  nav.T_map_body.q = (nav.T_map_body.q * (has_imu_ ? m.dq : so3::exp(dt * c.rate))).normalized();
+  c.position_variance += 2 * dt * c.covariance + dt * dt * c.velocity_variance;
+  c.covariance += dt * c.velocity_variance;
+  if (has_imu_) return;
+  c.velocity_variance += 10 * dt;  // a vehicle that nobody measures
+  c.rotation_variance += slices_ == 1 ? 1.0 * dt * dt : 0.1 * dt * dt;
+}
+
+void Capture::look(const Pose& T_map_body) {
+  points_.clear();
+  const ContourMap& map = index_.map();
+  for (const std::uint32_t i : visible_->choose(T_map_body * T_body_cam_))
+    points_.push_back({map.position(i), map.points[i].tangent.cast<double>()});
+}
+
+/// Moves the slice's events to where they would be had the body not turned from one instant, age_s ago.
+void Capture::turn_back(double age_s, std::uint32_t now_us) {
+  turned_ = slice_;
+  if (!has_imu_) return;
+  const Eigen::Vector3d rate_cam = T_body_cam_.q.conjugate() * rate_;
+  const ImageSize size = camera_.size();
+  const int columns = size.width / kFlowCell_px + 1, rows = size.height / kFlowCell_px + 1;
+  std::vector<Eigen::Vector2d> flow(static_cast<std::size_t>(columns * rows), Eigen::Vector2d::Zero());
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const auto ray = camera_.unproject({(column + 0.5) * kFlowCell_px, (row + 0.5) * kFlowCell_px});
+      Matrix23d J;
+      if (ray && camera_.project(*ray, &J))
+        flow[static_cast<std::size_t>(row * columns + column)] = -J * rate_cam.cross(*ray);
+    }
+  std::size_t kept = 0;
+  for (FrontEvent e : slice_) {
+    const double later_s = 1e-6 * (now_us - e.stamp_us) - age_s;  // by so much the instant is after the event
+    const Eigen::Vector2d& f =
+        flow[static_cast<std::size_t>(e.y / kFlowCell_px * columns + e.x / kFlowCell_px)];
+    const double x = std::round(e.x + f.x() * later_s), y = std::round(e.y + f.y() * later_s);
+    if (!(x >= 0 && y >= 0 && x < size.width && y < size.height)) continue;
+    e.x = static_cast<std::uint16_t>(x);
+    e.y = static_cast<std::uint16_t>(y) & 0x7FFF;
+    turned_[kept++] = e;
+  }
+  turned_.resize(kept);
+}
+
+std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
+                                            std::span<const FrontEvent> events, const ImuIncrement& motion,
+                                            const Eigen::Vector3d& angular_rate) {
+  since_ = joined(since_, motion);
+  rate_ = angular_rate;
+  if (to_seconds(t - last_slice_) < config_.gap_s) {
+    slice_begin_ = t;
+    return {};
+  }
+  slice_.insert(slice_.end(), events.begin(), events.end());
+  const double filled =
+      static_cast<double>(slice_.size()) / (config_.slice_events_per_column * camera_.size().width);
+  const double span_s = to_seconds(t - slice_begin_);
+  if (!(filled >= 1 || (filled >= kThinShare && span_s >= config_.short_slice_s) ||
+        span_s >= config_.longest_slice_s))
+    return {};
+  if (slice_.size() < kFewestEvents) {
+    slice_.clear();
+    slice_begin_ = t;
+    return {};
+  }
+  double age_s = 0;
+  for (const FrontEvent& e : slice_) age_s += 1e-6 * (now_us - e.stamp_us);
+  age_s /= static_cast<double>(std::max<std::size_t>(1, slice_.size()));
+  turn_back(age_s, now_us);
+  field_->build(turned_);
+  Candidate prior{prior_};
+  move(prior, since_);
+  prior_ = prior.nav;
+  elapsed_s_ += since_.dt_s;
+  if (slices_ == 0)
+    first_slice(age_s, now_us, span_s);
+  else
+    next_slice(age_s, now_us, span_s);
+  since_ = {};
+  ++slices_;
+  const auto found = decide();
+  slice_.clear();
+  slice_begin_ = last_slice_ = t;
+  return found;
+}
+
+void Capture::first_slice(double age_s, std::uint32_t now_us, double span_s) {
+  const double widening = std::pow(kWidening, std::clamp(searches_ - kSameWidth, 0, kMostWidenings));
+  Matrix6d covariance = widening * widening * prior_covariance_;
+  covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(config_.velocity_sigma_m_s * elapsed_s_, 2);
+  look(prior_.T_map_body);
+  candidates_.clear();
+  if (points_.empty()) return;
+  const SearchView view{*field_, camera_, T_body_cam_, points_};
+  for (const PoseGuess& guess :
+       search_.search(view, prior_.T_map_body, covariance, static_cast<unsigned>(1 + searches_))) {
+    Candidate c{prior_};
+    // The slice shows where the body was age_s ago.
+    c.nav.T_map_body = {guess.T_map_body.q * so3::exp(age_s * rate_),
+                        guess.T_map_body.p + age_s * prior_.velocity};
+    if (candidates_.size() < static_cast<std::size_t>(config_.sharpened)) sharpen(c, now_us, span_s);
+    const double share = c.slope >= config_.least_slope ? 1 : kBlunt;
+    c.slopes = c.slope;
+    c.position_variance = std::pow(share * kPositionSigma_m, 2);
+    c.rotation_variance = std::pow(share * kRotationSigma_rad, 2);
+    c.velocity_variance = config_.velocity_sigma_m_s * config_.velocity_sigma_m_s;
+    candidates_.push_back(c);
+  }
+}
+
+void Capture::next_slice(double age_s, std::uint32_t now_us, double span_s) {
+  for (Candidate& c : candidates_) move(c, since_);
+  if (candidates_.empty()) return;
+  look(candidates_.front().nav.T_map_body);
+  if (points_.empty()) return;
+  const SearchView view{*field_, camera_, T_body_cam_, points_};
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    Candidate& c = candidates_[i];
+    const Candidate predicted = c;
+    const Eigen::Vector3d rate = has_imu_ ? rate_ : c.rate;
+    const Pose then{c.nav.T_map_body.q * so3::exp(-age_s * rate),
+                    c.nav.T_map_body.p - age_s * c.nav.velocity};
+    Vector6d information;
+    information.head<3>().setConstant(1 / c.position_variance);
+    information.tail<3>().setConstant(1 / (c.rotation_variance + std::pow(kBlunt * kRotationSigma_rad, 2)));
+    const PoseGuess guess =
+        search_.refine(view, then, information.asDiagonal(), 2 * config_.search.coarse_px);
+    c.nav.T_map_body = c.nav.T_map_body.plus(guess.T_map_body.minus(then));
+    if (i < static_cast<std::size_t>(config_.sharpened)) sharpen(c, now_us, span_s);
+    c.slopes += kNewest * (c.slope - c.slopes);
+    const Vector6d moved = c.nav.T_map_body.minus(predicted.nav.T_map_body);
+    c.nav = predicted.nav;
+    correct(c, moved, c.slope >= config_.least_slope ? 1 : kBlunt);
+  }
+  std::stable_sort(candidates_.begin(), candidates_.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.slopes > b.slopes; });
+  drop_repeats();
+}
+
+/// Position and velocity by a Kalman filter of two states an axis, rotation likewise by one.
+void Capture::correct(Candidate& c, const Vector6d& moved, double share) const {
+  const double measured = std::pow(share * kPositionSigma_m, 2),
+               turned = std::pow(share * kRotationSigma_rad, 2);
+  const double gain = 1 / (c.position_variance + measured);
+  c.nav.T_map_body.p += gain * c.position_variance * moved.head<3>();
+  c.nav.velocity += gain * c.covariance * moved.head<3>();
+  c.velocity_variance -= gain * c.covariance * c.covariance;
+  c.covariance *= gain * measured;
+  c.position_variance *= gain * measured;
+  const double turn = c.rotation_variance / (c.rotation_variance + turned);
+  c.nav.T_map_body.q = (c.nav.T_map_body.q * so3::exp(turn * moved.tail<3>())).normalized();
+  if (!has_imu_) c.rate += moved.tail<3>() / std::max(since_.dt_s, 1e-3) * (slices_ == 1 ? 1 : 0.5);
+  c.rotation_variance *= turned / (c.rotation_variance + turned);
+}
+
+/// Candidates that have come together go on as one. Sorted, best first.
+void Capture::drop_repeats() {
+  std::vector<Candidate> different;
+  for (const Candidate& c : candidates_)
+    if (std::none_of(different.begin(), different.end(), [&](const Candidate& other) {
+          const Vector6d d = c.nav.T_map_body.minus(other.nav.T_map_body);
+          return d.head<3>().norm() < kOne_m && d.tail<3>().norm() < kOne_rad &&
+                 (c.nav.velocity - other.nav.velocity).norm() < kOne_m_s;
+        }))
+      different.push_back(c);
+  candidates_ = std::move(different);
+}
+
+/// Each event of the slice at its own time against the contours, under gates that close.
+void Capture::sharpen(Candidate& c, std::uint32_t now_us, double span_s) {
+  const ContourView view{index_.map(), pieces_, camera_, T_body_cam_, EventAlignmentConfig{}.map_sigma_m};
+  const auto& chosen = all_visible_->choose(c.nav.T_map_body * T_body_cam_);
+  const Pose from = c.nav.T_map_body;
+  // The newest part, in which rates are constant.
+  span_s = std::min(span_s, kSharpen_s);
+  const auto begin = std::find_if(slice_.begin(), slice_.end(), [&](const FrontEvent& e) {
+    return 1e-6 * (now_us - e.stamp_us) <= span_s;
+  });
+  const std::span<const FrontEvent> events(begin, slice_.end());
+  Vector6d sure;
+  sure.head<3>().setConstant(1 / (kSharpenSigma_m * kSharpenSigma_m));
+  sure.tail<3>().setConstant(1 / (kSharpenSigma_rad * kSharpenSigma_rad));
+  const Matrix6d known = Matrix6d::Zero();
+  for (const auto& stage : stages_)
+    for (int step = 0; step < kSteps; ++step) {
+      Pose& pose = c.nav.T_map_body;
+      project_contours(view, chosen, {pose, c.nav.velocity, has_imu_ ? rate_ : c.rate}, span_s, samples_);
+      stage->forget();
+      const EventAlignmentResult r = stage->align({events, now_us, span_s, samples_, known});
+      c.slope = r.slope;
+      const Matrix6d H = r.information + Matrix6d(sure.asDiagonal());
+      const Vector6d d = H.ldlt().solve(r.vector - sure.cwiseProduct(pose.minus(from)));
+      if (d.allFinite() && !(stage == stages_.back() && step + 1 == kSteps)) pose = pose.plus(d);
+    }
+}
+
+std::optional<Capture::Found> Capture::decide() {
+  if (slices_ < config_.least_slices) return {};
+  if (!candidates_.empty()) {
+    const Candidate& best = candidates_.front();
+    const auto rival = std::find_if(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
+      const Vector6d d = c.nav.T_map_body.minus(best.nav.T_map_body);
+      return d.head<3>().norm() >= kSame_m || d.tail<3>().norm() >= kSame_rad;
+    });
+    const double lead = best.slopes - (rival == candidates_.end() ? 0 : rival->slopes);
+    if (best.slopes >= config_.least_slope && lead >= config_.least_lead) {
+      searching_ = false;
+      return Found{best.nav, has_imu_ ? rate_ : best.rate};
+    }
+    if (slices_ < (best.slopes >= config_.least_slope ? config_.most_slices : config_.least_slices + 1))
+      return {};
+  }
+  // Anew, from where the prior has come to, and wider.
+  slices_ = 0;
+  ++searches_;
+  return {};
+}
+
+}  // namespace evpose

@@ -49,6 +49,22 @@ TEST(Strapdown, BiasesAreTakenOff) {
   EXPECT_LT((biased.velocity - clean.velocity).norm(), 1e-15);
 }
 
+TEST(Strapdown, JoinedIncrementsMoveAStateAsItsStepsDo) {
+  ImuIncrement all;
+  NavState by_steps = Circle::state(0);
+  const Eigen::Vector3d bg(0.01, -0.02, 0.03), ba(0.1, 0.2, -0.3);
+  for (TimeNs t = 0; t < from_seconds(0.1); t += kNsPerMs) {
+    all = joined(all, integrate(Circle::sample(t), Circle::sample(t + kNsPerMs), bg, ba));
+    by_steps = strapdown(by_steps, Circle::sample(t), Circle::sample(t + kNsPerMs), bg, ba, kGravity);
+  }
+  const NavState s = Circle::state(0);
+  EXPECT_NEAR(all.dt_s, 0.1, 1e-12);
+  const Eigen::Vector3d p = s.T_map_body.p + 0.1 * s.velocity + 0.005 * kGravity + s.T_map_body.q * all.dp;
+  EXPECT_LT((p - by_steps.T_map_body.p).norm(), 1e-12);
+  EXPECT_LT((s.velocity + 0.1 * kGravity + s.T_map_body.q * all.dv - by_steps.velocity).norm(), 1e-12);
+  EXPECT_LT(so3::log((s.T_map_body.q * all.dq).conjugate() * by_steps.T_map_body.q).norm(), 1e-12);
+}
+
 TEST(Strapdown, AtRestNothingMoves) {
   const ImuSample a{0, {0, 0, 0}, {0, 0, 9.81}}, b{kNsPerS, {0, 0, 0}, {0, 0, 9.81}};
   const NavState s = strapdown({}, a, b, {0, 0, 0}, {0, 0, 0}, kGravity);

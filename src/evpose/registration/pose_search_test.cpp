@@ -29,8 +29,9 @@ TEST(EdgeField, DistanceIsThatOfTheLineAndGrowsAcrossIt) {
     const EdgeField::Sample s = field.sample(x, 120, upright);
     EXPECT_NEAR(s.distance, std::abs(x - 150), 1e-4);
     EXPECT_NEAR(s.dy, 0, 1e-4);
-    if (x < 149) EXPECT_NEAR(s.dx, -1, 1e-4);
-    if (x > 151) EXPECT_NEAR(s.dx, 1, 1e-4);
+    if (std::abs(x - 150) > 1) {
+      EXPECT_NEAR(s.dx, x < 150 ? -1 : 1, 1e-4) << x;
+    }
   }
 }
 
@@ -109,7 +110,7 @@ TEST_F(PoseSearchLaws, TheTruePoseScoresBest) {
   for (int axis = 0; axis < 6; ++axis) {
     Vector6d d = Vector6d::Zero();
     d(axis) = 0.04;
-    EXPECT_GT(best, search.score(view(), Pose{}.plus(d), 1) + 0.2) << axis;
+    EXPECT_GT(best, search.score(view(), Pose{}.plus(d), 1) + 0.03) << axis;
   }
 }
 
@@ -129,10 +130,10 @@ TEST_F(PoseSearchLaws, ThePoseIsFoundFromAWidePrior) {
   sigma << 0.1, 0.1, 0.1, 0.04, 0.04, 0.04;
   const Matrix6d covariance = sigma.cwiseAbs2().asDiagonal();
   const auto found = search.search(view(), Pose{}.plus(d), covariance, 1);
-  ASSERT_GE(found.size(), 2u);
+  ASSERT_FALSE(found.empty());
   EXPECT_LT(found[0].T_map_body.p.norm(), 0.01);
   EXPECT_LT(so3::log(found[0].T_map_body.q).norm(), 0.005);
-  EXPECT_GT(found[0].score, found[1].score);
+  for (const PoseGuess& g : found) EXPECT_LE(g.score, found[0].score);
 }
 
 TEST_F(PoseSearchLaws, TheSameSeedGivesTheSamePoses) {

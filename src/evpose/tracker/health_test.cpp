@@ -15,12 +15,24 @@ class HealthLaws : public ::testing::Test {
   HealthLaws() { monitor_.start(0); }
   Health step(bool accepted, double sigma_px = 0.1, const std::string& refused = "no events") {
     t_ += 10 * kNsPerMs;
-    return monitor_.judge({t_, accepted, accepted ? "" : refused, sigma_px, ""}, &reason_);
+    return monitor_.judge({t_, accepted, accepted ? "" : refused, searching_, sigma_px, ""}, &reason_);
   }
   HealthMonitor monitor_{HealthConfig{}};
   TimeNs t_ = 0;
+  bool searching_ = false;
   std::string reason_;
 };
+
+TEST_F(HealthLaws, ASearchedPoseIsNotTracked) {
+  searching_ = true;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(step(false), Health::initialising);
+  searching_ = false;
+  for (int i = 0; i < 10; ++i) step(true);
+  EXPECT_EQ(monitor_.state(), Health::tracking);
+  searching_ = true;
+  EXPECT_EQ(step(false, 0.1, "searching for the pose"), Health::lost);
+  EXPECT_EQ(reason_, "searching for the pose");
+}
 
 TEST_F(HealthLaws, InitialisesThenTracksAndSaysWhyOnce) {
   EXPECT_EQ(step(true), Health::initialising);
@@ -54,7 +66,8 @@ TEST_F(HealthLaws, WithoutAnyRegistrationItKeepsInitialising) {
 
 TEST_F(HealthLaws, FaultOfTheImuIsNamed) {
   for (int i = 0; i < 10; ++i) step(true);
-  EXPECT_EQ(monitor_.judge({t_ + 1, true, "", 0.1, "IMU stuck: gyroscope x"}, &reason_), Health::degraded);
+  EXPECT_EQ(monitor_.judge({t_ + 1, true, "", false, 0.1, "IMU stuck: gyroscope x"}, &reason_),
+            Health::degraded);
   EXPECT_EQ(reason_, "IMU stuck: gyroscope x");
 }
 

@@ -13,6 +13,7 @@ namespace {
 constexpr int kBlockCubes = 8;                 // a block is 8 x 8 x 8 cubes
 constexpr float kOccluderCubes = 4;            // triangles are gathered in boxes of 4 x 4 x 4 cubes ...
 constexpr std::uint32_t kMostOccluders = 256;  // ... and by so many
+constexpr double kBegin = 0.7;                 // of the way to a refresh, the next choice is begun
 constexpr double kDepthCell_px = 2;            // of the occluders' depth buffer
 // Two points are on one contour of the image if their directions and offsets agree this well.
 constexpr float kSameDirectionSin = 0.2F;
@@ -211,7 +212,7 @@ const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
     // Too late for slices, unless what is under way is of this place.
     if (!under_way_ || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px) start(T_map_cam);
     work(remaining_);
-  } else if (under_way_ || moved > 0.5 * config_.refresh_px) {
+  } else if (under_way_ || moved > kBegin * config_.refresh_px) {
     if (!under_way_) start(T_map_cam);
     // In equal slices until the move is complete, as far as it goes on like this.
     const double step = last_ ? moved_px(*last_, T_map_cam) : 0, left = config_.refresh_px - moved;

@@ -15,6 +15,7 @@ constexpr int kSteps = 3;  // at each gate
 constexpr double kSharpen_s = 0.01;
 constexpr double kSharpenSigma_m = 0.02, kSharpenSigma_rad = 0.01;
 constexpr double kStride_px = 8, kMargin_px = 40;
+constexpr double kLongestPause_s = 2;
 constexpr double kThinShare = 0.25;
 constexpr std::size_t kFewestEvents = 500;  // of a slice: nothing moves
 constexpr int kPoints = 700;
@@ -163,12 +164,18 @@ void Capture::turn_back(double age_s, std::uint32_t now_us) {
   turned_.resize(kept);
 }
 
+/// Before a search: the first follow at once, later ones ever more slowly, since each costs a second of
+/// processor time.
+double Capture::pause_s() const {
+  return searches_ <= kSameWidth ? config_.gap_s : std::min(kLongestPause_s, 0.1 * (searches_ - kSameWidth));
+}
+
 std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
                                             std::span<const FrontEvent> events, const ImuIncrement& motion,
                                             const Eigen::Vector3d& angular_rate) {
   since_ = joined(since_, motion);
   rate_ = angular_rate;
-  if (to_seconds(t - last_slice_) < config_.gap_s) {
+  if (to_seconds(t - last_slice_) < (slices_ == 0 ? pause_s() : config_.gap_s)) {
     slice_begin_ = t;
     return {};
   }

@@ -80,6 +80,7 @@ class Capture {
   void turn_back(double age_s, std::uint32_t now_us);
   void sharpen(Candidate& c, std::uint32_t now_us, double span_s);
   std::optional<Found> decide();
+  double pause_s() const;
 
   CaptureConfig config_;
   const ContourIndex& index_;

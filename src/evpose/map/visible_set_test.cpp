@@ -88,7 +88,8 @@ TEST_F(VisibleLaws, SlicesChooseWhatOneCallChooses) {
   step(5) = 0.036 * config.refresh_px / camera_->focal_px();
   const auto before = sliced.chosen();
   Pose at = pose_;
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(sliced.choose(at = at.plus(step)), before) << i;  // far enough, begun
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(sliced.choose(at = at.plus(step)), before) << i;  // far enough, begun
   for (int i = 0; i < 100; ++i) sliced.choose(at);
   EXPECT_NE(sliced.chosen(), before);
   EXPECT_EQ(sliced.chosen(), fresh.choose(at));

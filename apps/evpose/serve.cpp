@@ -49,6 +49,12 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
                       "of a source: the IMU's noise, as Kalibr's imu.yaml");
   command->add_option("--occluders", track.occluders, "PLY mesh that hides contours behind it");
   command->add_option("--init", track.init, "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
+  command
+      ->add_option("--init-sigma", track.init_sigma,
+                   "how far off the given pose may be, m and deg per axis: it is searched there")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0.0, 10.0));
   command->add_option("--mavlink", request->mavlink,
                       "to an autopilot: udp://HOST:PORT, udpin://HOST:PORT or serial:///dev/ttyX:BAUD");
   auto port = std::make_shared<int>(8088);

@@ -82,7 +82,8 @@ Expected<TrackJob> prepare_source(const ServeRequest& request, const RunConfig& 
   if (!map) return map.error();
   auto camera = make_camera(recording.camera);
   if (!camera) return Error{track.calibration, camera.error().what, camera.error().fix};
-  const auto start = choose_start(track.init, recording, {}, &job.config.tracker.fusion);
+  const auto start = choose_start(track.init, recording, {}, {track.init_sigma[0], track.init_sigma[1]},
+                                  &job.config.tracker.fusion);
   if (!start) return start.error();
   job.map = *map;
   job.start = *start;

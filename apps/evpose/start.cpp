@@ -12,8 +12,6 @@ namespace {
 
 constexpr double kUnknownSpeed_m_s = 0.5;  // of a start pose given without velocity
 constexpr double kUnknownRate_rad_s = 0.5;
-constexpr double kGivenPosition_m = 0.03,
-                 kGivenRotation_rad = 0.01;   // sigma of a pose given by hand, per axis
 constexpr TimeNs kDifference = 5 * kNsPerMs;  // velocity from poses at least so far to both sides
 
 /// First pose of the trajectory inside the recording, velocities from its neighbours.
@@ -78,7 +76,8 @@ void widen(double position_m, double rotation_rad, FusionConfig* config) {
 }  // namespace
 
 Expected<StartState> choose_start(const std::string& init, const Recording& recording,
-                                  const std::vector<TimedPose>& truth, FusionConfig* config) {
+                                  const std::vector<TimedPose>& truth, const StartSigma& sigma,
+                                  FusionConfig* config) {
   if (init == "groundtruth" || (init == "auto" && !truth.empty())) {
     if (truth.empty())
       return Error{"--init groundtruth", "the recording has no ground truth",
@@ -107,7 +106,7 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
   if (start->t > recording.last_ns)
     return Error{"--init", "the start lies after the recording's end",
                  "give a time on the recording's clock after @"};
-  widen(kGivenPosition_m, kGivenRotation_rad, config);
+  widen(sigma.position_m, sigma.rotation_deg * M_PI / 180, config);
   return start;
 }
 

@@ -10,6 +10,11 @@
 
 namespace evpose {
 
+/// How far off a pose given by hand may be, 1 sigma per axis; 0: as configured.
+struct StartSigma {
+  double position_m = 0, rotation_deg = 0;
+};
+
 /// Where a run starts, from the words of --init:
 ///   auto         ground truth if the recording has it, else its initial_pose
 ///   groundtruth  the first ground-truth pose inside the events, with its velocity
@@ -17,6 +22,7 @@ namespace evpose {
 ///   FILE         a TUM trajectory of T_map_body, used like ground truth
 /// A pose without velocity widens the start's uncertainty in `config`.
 Expected<StartState> choose_start(const std::string& init, const Recording& recording,
-                                  const std::vector<TimedPose>& truth, FusionConfig* config);
+                                  const std::vector<TimedPose>& truth, const StartSigma& sigma,
+                                  FusionConfig* config);
 
 }  // namespace evpose

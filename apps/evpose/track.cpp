@@ -42,6 +42,12 @@ void add_track(CLI::App& app, std::function<int()>& run) {
   command->add_option("--init", request->init,
                       "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file; default: ground truth if "
                       "there is one, else the recording's initial_pose");
+  command
+      ->add_option("--init-sigma", request->init_sigma,
+                   "how far off the given pose may be, m and deg per axis: it is searched there")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0.0, 10.0));
   request->output = "run";
   command->add_option("-o,--output", request->output, "run folder")->capture_default_str();
   command->add_option("--config", request->config_file, "YAML file with settings");

@@ -145,7 +145,8 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   }
   if (recording->has_imu)
     if (auto ok = check_units(*recording, truth); !ok) return ok.error();
-  const auto start = choose_start(request.init, *recording, truth, &job.config.tracker.fusion);
+  const auto start = choose_start(request.init, *recording, truth,
+                                  {request.init_sigma[0], request.init_sigma[1]}, &job.config.tracker.fusion);
   if (!start) return start.error();
   job.recording = *recording;
   job.map = *map;

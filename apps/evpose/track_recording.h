@@ -28,6 +28,7 @@ struct TrackRequest {
   std::string map;                       ///< file; empty: the recording's own
   std::string occluders;                 ///< mesh file; empty: those of the map, if any
   std::string init = "auto";             ///< see start.h
+  std::vector<double> init_sigma{0, 0};  ///< of a pose given there: m, deg
   std::string output;                    ///< run folder
   std::string config_file;               ///< optional YAML
   std::vector<std::string> assignments;  ///< "key=value"

@@ -37,7 +37,7 @@ class NoiseFilter {
     const std::size_t i = index(x, y);
     Cell& cell = cells_[i];
     if (cell.unsupported == kMasked) return false;
-    bool supported;
+    bool supported = false;
     if (config_.same_polarity && on) {
       supported = newest_neighbour(&last_on_[i]) + support_us_ >= stamp_us;
       last_on_[i] = stamp_us;

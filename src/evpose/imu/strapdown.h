@@ -29,8 +29,8 @@ struct ImuIncrement {
 ImuIncrement integrate(const ImuSample& a, const ImuSample& b, const Eigen::Vector3d& gyro_bias,
                        const Eigen::Vector3d& accel_bias);
 
-/// Of two intervals, one after the other.
-ImuIncrement joined(const ImuIncrement& first, const ImuIncrement& then);
+/// Of two intervals, b after a.
+ImuIncrement joined(const ImuIncrement& a, const ImuIncrement& b);
 
 /// One step from a.t to b.t by integrate() and gravity.
 NavState strapdown(const NavState& state, const ImuSample& a, const ImuSample& b,

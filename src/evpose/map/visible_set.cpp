@@ -286,7 +286,7 @@ std::size_t VisibleSet::cell_of(const Eigen::Vector2f& pixel) const {
   return static_cast<std::size_t>(row * columns_ + column);
 }
 
-/// True if a chosen point of the same contour is nearer than the stride.
+/// True if a chosen point of the same contour, which is at u along t, is nearer than the stride.
 bool VisibleSet::has_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const {
   const auto stride = static_cast<float>(config_.stride_px);
   const auto middle = static_cast<std::ptrdiff_t>(cell_of(u));

@@ -96,10 +96,10 @@ class VisibleSet {
   void start(const Pose& T_map_cam);
   /// Looks at so many triangles and points, or a few more; the last slice puts the new choice into points_.
   void work(std::size_t most);
-  void look_at(std::uint32_t point);
+  void look_at(std::uint32_t number);
   void finish();
   bool outside_cone(const Eigen::Vector3f& centre_cam, float radius) const;
-  bool has_neighbour(const Eigen::Vector2f& pixel, const Eigen::Vector2f& direction) const;
+  bool has_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const;
   std::size_t cell_of(const Eigen::Vector2f& pixel) const;
 
   const ContourIndex& index_;

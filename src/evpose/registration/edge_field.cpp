@@ -142,8 +142,8 @@ float EdgeField::chance(double x, double y, int direction, int spread) const {
 }
 
 float EdgeField::odds(double x, double y, int direction, int spread) const {
-  const int column = std::clamp(static_cast<int>(x + 0.5) / cell_, 0, columns_ - 1),
-            row = std::clamp(static_cast<int>(y + 0.5) / cell_, 0, rows_ - 1);
+  const int column = std::clamp(static_cast<int>(std::lround(x)) / cell_, 0, columns_ - 1),
+            row = std::clamp(static_cast<int>(std::lround(y)) / cell_, 0, rows_ - 1);
   const float d = at(column, row, direction) / spreads_[static_cast<std::size_t>(spread)];
   return std::exp(-0.5F * d * d) / chance(x, y, direction, spread);
 }

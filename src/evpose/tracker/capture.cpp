@@ -51,8 +51,8 @@ void describe(ConfigTable& table, CaptureConfig& c) {
             {1e-4, 1});
   table.add("verify_s", c.verify_s, "s", "a pose found is watched for so long before it is called tracking",
             {0, 10});
-  table.add("patience_s", c.patience_s, "s", "events that do not gather at the contours for so long: search",
-            {0, 100});
+  table.add("patience_s", c.patience_s, "s",
+            "lost, or events that do not gather at the contours, for so long: search", {0, 100});
   table.add("found_position_sigma_m", c.found_position_sigma_m, "m", "of a pose found", {1e-4, 1});
   table.add("found_rotation_sigma_rad", c.found_rotation_sigma_rad, "rad", "of a pose found", {1e-5, 1});
   table.add("found_velocity_sigma_m_s", c.found_velocity_sigma_m_s, "m/s", "of a pose found", {1e-3, 10});

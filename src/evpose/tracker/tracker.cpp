@@ -360,7 +360,8 @@ Update Tracker::update(TimeNs t) {
   const Matrix6d covariance = fusion_->state().pose_covariance();
   evidence.sigma_px = sigma_px();
   out.health = health_.judge(evidence, &out.reason);
-  uncaptured_s_ = stpe.captured ? 0 : uncaptured_s_ + span_s;
+  const bool astray = !stpe.captured || (out.health == Health::lost && verify_until_ == 0);
+  astray_s_ = astray ? astray_s_ + span_s : 0;
   if (verify_until_ != 0 && t >= verify_until_) {
     verify_until_ = 0;
     if (stpe.slope < config_.capture.least_slope) {
@@ -372,15 +373,13 @@ Update Tracker::update(TimeNs t) {
       capture_.resume(t);
     }
   }
-  const bool gone =
-      (out.health == Health::lost && verify_until_ == 0) || uncaptured_s_ > config_.capture.patience_s;
-  if (config_.capture.on && !capture_.searching() && gone) {
+  if (config_.capture.on && !capture_.searching() && astray_s_ > config_.capture.patience_s) {
     Matrix6d around = covariance;
     around.diagonal().head<3>().array() += std::pow(config_.capture.position_sigma_m, 2);
     around.diagonal().tail<3>().array() += std::pow(config_.capture.rotation_sigma_rad, 2);
     before_search_ = fusion_->state();
     capture_.begin(t, fusion_->state().nav, around);
-    uncaptured_s_ = 0;
+    astray_s_ = 0;
   }
 
   const FusionState& state = fusion_->state();

@@ -164,7 +164,7 @@ class Tracker {
   ImuIncrement moved_;  ///< over the last prediction, while the pose is searched
   FusionState before_search_;
   TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
-  double uncaptured_s_ = 0;  ///< for how long the events have not gathered at the contours
+  double astray_s_ = 0;      ///< for how long it has been lost, or its events have not gathered at contours
   EventFront::Counts counted_;
   double events_time_s_ = 0;
 };

@@ -51,8 +51,11 @@ Expected<Setup> read_setup(const Parameters& parameters) {
   }
   Setup out;
   out.has_imu = chosen->T_cam_imu.has_value();
-  out.tracker = {*camera, chosen->T_cam_imu.value_or(Pose{}).inverse(),
-                 out.has_imu ? MotionModel::imu : MotionModel::constant_velocity, {}, nullptr};
+  out.tracker = {*camera,
+                 chosen->T_cam_imu.value_or(Pose{}).inverse(),
+                 out.has_imu ? MotionModel::imu : MotionModel::constant_velocity,
+                 {},
+                 nullptr};
   if (calibration->imu_noise) out.tracker.imu_noise = *calibration->imu_noise;
   if (!parameters.imu_model.empty()) {
     const auto noise = read_imu_noise(parameters.imu_model);
@@ -61,17 +64,22 @@ Expected<Setup> read_setup(const Parameters& parameters) {
   }
   out.tracker.map = std::make_shared<const ContourMap>(std::move(*map));
   double v[7];
-  if (std::sscanf(parameters.init.c_str(), "%lf,%lf,%lf,%lf,%lf,%lf,%lf", v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6) != 7)
+  if (std::sscanf(parameters.init.c_str(), "%lf,%lf,%lf,%lf,%lf,%lf,%lf", v, v + 1, v + 2, v + 3, v + 4,
+                  v + 5, v + 6) != 7)
     return Error{"parameter ~init", "is no pose", "give x,y,z,qx,qy,qz,qw"};
   out.start.T_map_body = {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}};
   auto& fusion = out.config.fusion;
   fusion.start_velocity_sigma_m_s = std::max(fusion.start_velocity_sigma_m_s, 0.5);
   fusion.start_angular_rate_sigma_rad_s = std::max(fusion.start_angular_rate_sigma_rad_s, 0.5);
   ConfigTable table;
+  out.config.capture.on = false;  // a search takes longer than the data it looks at
   describe(table, out.config);
   for (const std::string& setting : parameters.settings) {
     const auto equals = setting.find('=');
-    if (auto ok = table.set(setting.substr(0, equals), equals == std::string::npos ? "" : setting.substr(equals + 1), "parameter ~settings"); !ok)
+    if (auto ok =
+            table.set(setting.substr(0, equals),
+                      equals == std::string::npos ? "" : setting.substr(equals + 1), "parameter ~settings");
+        !ok)
       return ok.error();
   }
   return out;
@@ -92,10 +100,11 @@ class TrackingEngine : public Engine {
       : setup_(std::move(setup)),
         callbacks_(std::move(callbacks)),
         queue_({}),
-        session_({}, setup_.has_imu, setup_.start, std::nullopt,
-                 [this](const StartState& start, bool again) { return make(start, again); },
-                 {[this](const Update& u, TimeNs, const Tracker&) { add(u); }, [](const std::string&) {},
-                  [](const std::string&) {}, [this](const std::string& words) { callbacks_.notice(words); }}) {}
+        session_(
+            {}, setup_.has_imu, setup_.start, std::nullopt,
+            [this](const StartState& start, bool again) { return make(start, again); },
+            {[this](const Update& u, TimeNs, const Tracker&) { add(u); }, [](const std::string&) {},
+             [](const std::string&) {}, [this](const std::string& words) { callbacks_.notice(words); }}) {}
 
   Expected<std::unique_ptr<Tracker>> make(const StartState& start, bool again) const {
     TrackerConfig config = setup_.config;
@@ -111,7 +120,8 @@ class TrackingEngine : public Engine {
     topic.type = type;
     topic.md5 = md5;
     topic.wire = Wire::ros1;
-    if (!is_event_array(type) && !is_event_packet(type)) return "topic events: messages of type " + type + " are no events";
+    if (!is_event_array(type) && !is_event_packet(type))
+      return "topic events: messages of type " + type + " are no events";
     const auto parsed = parse_event_message(topic, {0, 0, std::span(bytes, size)}, "topic events");
     if (!parsed) return parsed.error().line();
     decoder_.begin(*parsed, "topic events");
@@ -125,13 +135,15 @@ class TrackingEngine : public Engine {
       StreamItem item;
       item.kind = StreamItem::Kind::events;
       item.events.base = block.base_us * kNsPerUs;
-      item.events.events.assign(block.events.begin(), block.events.begin() + static_cast<std::ptrdiff_t>(block.count));
+      item.events.events.assign(block.events.begin(),
+                                block.events.begin() + static_cast<std::ptrdiff_t>(block.count));
       queue_.push(std::move(item));
     }
     return {};
   }
 
-  void add_imu(std::int64_t t_ns, const std::array<double, 3>& gyro, const std::array<double, 3>& accel) override {
+  void add_imu(std::int64_t t_ns, const std::array<double, 3>& gyro,
+               const std::array<double, 3>& accel) override {
     StreamItem item;
     item.kind = StreamItem::Kind::imu;
     item.imu = {{t_ns, Eigen::Vector3d(gyro.data()), Eigen::Vector3d(accel.data())}};
@@ -150,8 +162,8 @@ class TrackingEngine : public Engine {
 
   Status status() const override {
     const auto queued = queue_.counts();
-    return {to_string(health_), reason_, session_.counts().updates, session_.counts().restarts, queued.events_in,
-            queued.events_shed + session_.counts().events_shed};
+    return {to_string(health_),         reason_,          session_.counts().updates,
+            session_.counts().restarts, queued.events_in, queued.events_shed + session_.counts().events_shed};
   }
 
   std::vector<std::array<float, 3>> map_points() const override {
@@ -170,8 +182,9 @@ class TrackingEngine : public Engine {
     if (!u.reason.empty()) reason_ = u.reason;
     if (u.health != Health::tracking && u.health != Health::degraded) return;
     const RosState s = to_ros(u, Pose{});
-    callbacks_.pose({u.t, numbers<3>(s.T_map_base.p), numbers<4>(s.T_map_base.q.coeffs()), numbers<3>(s.velocity_base),
-                     numbers<3>(s.rates_base), numbers<36>(s.covariance), numbers<9>(s.velocity_covariance_base)});
+    callbacks_.pose({u.t, numbers<3>(s.T_map_base.p), numbers<4>(s.T_map_base.q.coeffs()),
+                     numbers<3>(s.velocity_base), numbers<3>(s.rates_base), numbers<36>(s.covariance),
+                     numbers<9>(s.velocity_covariance_base)});
   }
 
   Setup setup_;
@@ -186,7 +199,8 @@ class TrackingEngine : public Engine {
 
 }  // namespace
 
-std::unique_ptr<Engine> Engine::create(const Parameters& parameters, const Callbacks& callbacks, std::string& error) {
+std::unique_ptr<Engine> Engine::create(const Parameters& parameters, const Callbacks& callbacks,
+                                       std::string& error) {
   auto setup = read_setup(parameters);
   if (!setup) return error = setup.error().line(), nullptr;
   auto engine = std::make_unique<TrackingEngine>(std::move(*setup), callbacks);

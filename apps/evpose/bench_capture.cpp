@@ -51,13 +51,7 @@ Outcome start(const Streams& streams, const StartClass& from, unsigned seed) {
   const double slack_s = to_seconds(truth.back().t - first) - kWithin_s - 0.05;
   const TimeNs begin = first + from_seconds(uniform() * std::max(1e-3, slack_s));
   const TimeNs end = begin + from_seconds(kWithin_s + 0.01);
-  std::vector<EventPacket> packets;
-  for (const EventPacket& p : streams.packets)
-    if (!p.empty() && p.time(p.events.front()) >= begin && p.time(p.events.back()) < end)
-      packets.push_back(p);
-  std::vector<ImuSample> imu;
-  for (const ImuSample& s : streams.imu)
-    if (s.t >= begin - 20 * kNsPerMs && s.t < end + 20 * kNsPerMs) imu.push_back(s);
+  const auto [packets, imu] = excerpt(streams, begin, end);
 
   // Neither velocity nor rate is known.
   StartState state = start_at(truth, begin);

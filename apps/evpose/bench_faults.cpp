@@ -147,13 +147,7 @@ Outcome replay(const Streams& streams, const Replay& what) {
   const TimeNs from = begin + from_seconds(kFaultFrom_s + uniform(random, 0, 0.1));
   const TimeNs to = from + from_seconds(uniform(random, 0.03, 0.2));
 
-  std::vector<EventPacket> packets;
-  for (const EventPacket& p : streams.packets)
-    if (!p.empty() && p.time(p.events.front()) >= begin && p.time(p.events.back()) < end)
-      packets.push_back(p);
-  std::vector<ImuSample> imu;
-  for (const ImuSample& s : streams.imu)
-    if (s.t >= begin - 20 * kNsPerMs && s.t < end + 20 * kNsPerMs) imu.push_back(s);
+  auto [packets, imu] = excerpt(streams, begin, end);
   if (what.fault >= Fault::events_drop_out)
     spoil_events(what.fault, from, to, streams.job.setup.camera->size(), random, &packets);
   else if (what.fault != Fault::none)

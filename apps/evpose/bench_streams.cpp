@@ -44,6 +44,17 @@ void feed(const std::vector<EventPacket>& packets, const std::vector<ImuSample>&
   }
 }
 
+Excerpt excerpt(const Streams& streams, TimeNs begin, TimeNs end) {
+  constexpr TimeNs kBeside = 20 * kNsPerMs;
+  Excerpt out;
+  for (const EventPacket& p : streams.packets)
+    if (!p.empty() && p.time(p.events.front()) >= begin && p.time(p.events.back()) < end)
+      out.packets.push_back(p);
+  for (const ImuSample& s : streams.imu)
+    if (s.t >= begin - kBeside && s.t < end + kBeside) out.imu.push_back(s);
+  return out;
+}
+
 StartState start_at(const std::vector<TimedPose>& truth, TimeNs t) {
   const auto pose = [&](TimeNs at) {
     const auto after = std::lower_bound(truth.begin() + 1, truth.end() - 1, at,

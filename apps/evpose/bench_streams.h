@@ -19,6 +19,13 @@ Expected<Streams> load_streams(const TrackRequest& request, const RunConfig& con
 /// Feeds the packets and, ahead of each, the IMU samples that reach its end.
 void feed(const std::vector<EventPacket>& packets, const std::vector<ImuSample>& imu, Tracker& tracker);
 
+/// What lies between two times, with some IMU samples to both sides.
+struct Excerpt {
+  std::vector<EventPacket> packets;
+  std::vector<ImuSample> imu;
+};
+Excerpt excerpt(const Streams& streams, TimeNs begin, TimeNs end);
+
 /// The pose, velocity and rate that the truth has at a time inside it.
 StartState start_at(const std::vector<TimedPose>& truth, TimeNs t);
 

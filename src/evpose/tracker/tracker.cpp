@@ -349,8 +349,11 @@ Update Tracker::update(TimeNs t) {
   Evidence evidence;
   evidence.t = t;
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
-  evidence.searching = searching || t < verify_until_;
-  evidence.refused = searching ? "searching for the pose" : refusal(stpe, out.innovation);
+  // A pose that was found is believed once its events have gathered at the contours for a while.
+  const bool watched = verify_until_ != 0,
+             refuted = watched && t >= verify_until_ && stpe.slope < config_.capture.least_slope;
+  evidence.searching = searching || t < verify_until_ || refuted;
+  evidence.refused = searching || refuted ? "searching for the pose" : refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
   evidence.fault = blind ? "no IMU samples" : imu_watch_.fault(t);
   if (evidence.fault.empty() && !stpe.captured) evidence.fault = "events do not gather at the contours";
@@ -362,16 +365,14 @@ Update Tracker::update(TimeNs t) {
   out.health = health_.judge(evidence, &out.reason);
   const bool astray = !stpe.captured || (out.health == Health::lost && verify_until_ == 0);
   astray_s_ = astray ? astray_s_ + span_s : 0;
-  if (verify_until_ != 0 && t >= verify_until_) {
-    verify_until_ = 0;
-    if (stpe.slope < config_.capture.least_slope) {
-      // What a wrong pose has taught goes with it.
-      FusionState state = fusion_->state();
-      state.gyro_bias = before_search_.gyro_bias;
-      state.accel_bias = before_search_.accel_bias;
-      fusion_->start(state);
-      capture_.resume(t);
-    }
+  if (watched && t >= verify_until_) verify_until_ = 0;
+  if (refuted) {
+    // What a wrong pose has taught goes with it.
+    FusionState state = fusion_->state();
+    state.gyro_bias = before_search_.gyro_bias;
+    state.accel_bias = before_search_.accel_bias;
+    fusion_->start(state);
+    capture_.resume(t);
   }
   if (config_.capture.on && !capture_.searching() && astray_s_ > config_.capture.patience_s) {
     Matrix6d around = covariance;

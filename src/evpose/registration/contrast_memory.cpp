@@ -40,7 +40,7 @@ double ContrastMemory::steps(std::uint32_t piece) const {
   return p.net / (p.swept_px2 + kDoubt_px2);
 }
 
-double ContrastMemory::lateness_px(std::uint32_t piece, bool on) const {
+ContrastMemory::Lateness ContrastMemory::lateness(std::uint32_t piece) const {
   const double n = std::abs(steps(piece));
   const double late = known(piece) ? std::min(config_.latest_px,
                                               config_.lateness_px + config_.threshold_px / std::max(n, 1e-3))
@@ -48,7 +48,7 @@ double ContrastMemory::lateness_px(std::uint32_t piece, bool on) const {
   // Where the logarithm is halfway between both sides, of a pixel's width; s: square root of their ratio.
   const double s = std::exp(0.5 * n * config_.threshold);
   const double towards_dark = 0.5 - 1 / (1 + s);
-  return late + (on ? -towards_dark : towards_dark);
+  return {late - towards_dark, late + towards_dark};
 }
 
 }  // namespace evpose

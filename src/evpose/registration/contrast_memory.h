@@ -38,7 +38,10 @@ class ContrastMemory {
   /// How far behind the contour its events lie, px along the motion. Late by a part of a threshold: the pixel
   /// was on average half a threshold short of its first event. And displaced towards the dark side: a pixel's
   /// logarithm is halfway when most of it is still dark, so that brightening (on) is early, darkening late.
-  double lateness_px(std::uint32_t piece, bool on) const;
+  struct Lateness {
+    double on_px, off_px;
+  };
+  Lateness lateness(std::uint32_t piece) const;
 
  private:
   static constexpr double kLittle_px2 = 40;

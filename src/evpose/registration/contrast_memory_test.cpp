@@ -47,7 +47,7 @@ TEST(ContrastMemory, LatenessFallsWithContrast) {
   for (double steps : {0.2, 0.5, 1.0, 3.0}) {
     ContrastMemory memory(1, {});
     show(memory, steps, 500);
-    const double mean = 0.5 * (memory.lateness_px(0, true) + memory.lateness_px(0, false));
+    const double mean = 0.5 * (memory.lateness(0).on_px + memory.lateness(0).off_px);
     EXPECT_LE(mean, before);
     before = mean;
   }
@@ -62,8 +62,8 @@ TEST(ContrastMemory, EventsLieTowardsTheDarkSide) {
   show(memory, 4, 590);
   const double r = std::exp(memory.steps(0) * config.threshold);
   const double bright = (std::sqrt(1 / r) - 1 / r) / (1 - 1 / r);
-  EXPECT_NEAR(memory.lateness_px(0, false), 0.5 - bright, 1e-6);
-  EXPECT_NEAR(memory.lateness_px(0, true), bright - 0.5, 1e-6);
+  EXPECT_NEAR(memory.lateness(0).off_px, 0.5 - bright, 1e-6);
+  EXPECT_NEAR(memory.lateness(0).on_px, bright - 0.5, 1e-6);
 }
 
 }  // namespace

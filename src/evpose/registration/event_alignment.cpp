@@ -13,7 +13,10 @@ constexpr double kEdgePrior = 0.5;  // an event in the gate is of the contour ra
 constexpr double kGateRim = 0.8;    // events beyond this share of the gate tell the density at it
 constexpr double kSlope_s = 0.05;   // memory of the slope
 constexpr double kLeastSlope = 0.15;
-constexpr double kTelling = 50;  // events' weight from which on the slope is believed
+constexpr double kLatest_px = 0.5;  // by so much events may come after a contour and still be found
+constexpr std::uint32_t kShareOut = 4;
+constexpr double kCaptured = 0.3;  // slope of events that gather at the contours
+constexpr double kTelling = 50;    // events' weight from which on the slope is believed
 
 }  // namespace
 
@@ -22,9 +25,6 @@ void describe(ConfigTable& table, EventAlignmentConfig& c) {
             "events within this, joined with two sigma of the map, belong to a contour", {0.1, 50});
   table.add("widest_gate_px", c.widest_gate_px, "px",
             "an unsure prediction opens the gate by two sigma, but no further than to this", {0.1, 50});
-  table.add("capture_gate_px", c.capture_gate_px, "px",
-            "... and to this while the events in it show no contour", {0.1, 50});
-  table.add("capture_below", c.capture_below, "", "... that is, while their slope is less than this", {0, 1});
   table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
   table.add("shared_sigma_px", c.shared_sigma_px, "px", "error that neighbouring events share", {0, 10});
   table.add("shared_s", c.shared_s, "s", "how long a shared error lasts", {0, 100});
@@ -50,23 +50,15 @@ void describe(ConfigTable& table, EventAlignmentConfig& c) {
 EventAlignment::EventAlignment(ImageSize size, const EventAlignmentConfig& config, std::uint32_t pieces)
     : size_(size),
       config_(config),
-      strips_(size, config.strip_px, config.ambiguity_px),
+      index_(size, config.strip_px, config.ambiguity_px),
       contrast_(pieces, config.contrast) {}
 
 double EventAlignment::Slope::value() const {
   return weight > 0 ? std::clamp((inside - at_gate) / weight, kLeastSlope, 1.0) : 1;
 }
 
-double EventAlignment::lateness(const ContourSample& s, bool on) const {
-  if (!config_.lateness) return 0;
-  const double fade = std::min(1.0, std::abs(s.speed_px_s) / std::max(config_.lateness_from_px_s, 1e-9));
-  return std::copysign(fade, s.speed_px_s) * contrast_.lateness_px(s.piece, on);
-}
-
 /// Events spread evenly over the gate do not tell of contours: the pose is not where it is thought to be.
-bool EventAlignment::captured() const {
-  return slope_.weight < kTelling || slope_.value() >= config_.capture_below;
-}
+bool EventAlignment::captured() const { return slope_.weight < kTelling || slope_.value() >= kCaptured; }
 
 bool EventAlignment::polarity_is_wrong(const ContourSample& s, int sign) const {
   const double steps = contrast_.steps(s.piece);
@@ -77,33 +69,31 @@ bool EventAlignment::polarity_is_wrong(const ContourSample& s, int sign) const {
 /// Gates, lateness and excluded polarities of the samples, and what pixels they answer for.
 void EventAlignment::prepare(const EventAlignmentProblem& p) {
   const std::size_t n = p.samples.size();
-  areas_.resize(n);
+  strips_.resize(n);
   lines_.resize(n);
-  const double half_span_s = 0.5 * p.span_s, event_variance = config_.event_sigma_px * config_.event_sigma_px;
-  const double widest =
-      std::max(config_.gate_px, captured() ? config_.widest_gate_px : config_.capture_gate_px);
+  const double event_variance = config_.event_sigma_px * config_.event_sigma_px;
+  const double widest = std::max(config_.gate_px, config_.widest_gate_px);
   for (std::size_t i = 0; i < n; ++i) {
     const ContourSample& s = p.samples[i];
     const double pose_variance = std::max(0.0, s.jacobian.dot(p.pose_covariance * s.jacobian));
     const double own = std::min(config_.gate_px + 2 * std::sqrt(pose_variance), widest);
-    const double gate = std::hypot(own, 2 * s.map_sigma_px);
-    // The middle of the way that the contour makes during the span, and half its length.
-    const double middle = -s.speed_px_s * half_span_s + s.curvature_px_s2 * half_span_s * half_span_s;
-    const double reach = std::max(gate, config_.count_px) + std::abs(s.speed_px_s) * half_span_s + 0.5;
-    const Eigen::Vector2f centre = (s.pixel + middle * s.normal_px).cast<float>(),
-                          pixel = s.pixel.cast<float>(), normal = s.normal_px.cast<float>();
-    areas_[i] = {centre.x(), centre.y(), normal.x(), normal.y(), static_cast<float>(reach)};
+    const double gate = std::sqrt(own * own + 4 * s.map_sigma_px * s.map_sigma_px);
+    const Eigen::Vector2f pixel = s.pixel.cast<float>(), normal = s.normal_px.cast<float>();
+    strips_[i] = {pixel.x(),
+                  pixel.y(),
+                  normal.x(),
+                  normal.y(),
+                  static_cast<float>(1e-6 * s.speed_px_s),
+                  static_cast<float>(1e-12 * s.curvature_px_s2),
+                  static_cast<float>(std::max(gate, config_.count_px) + kLatest_px)};
     const double variance = event_variance + pose_variance + s.map_sigma_px * s.map_sigma_px;
     const double odds = kEdgePrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kEdgePrior);
     const int forward = s.speed_px_s > 0 ? 1 : -1;
-    lines_[i] = {pixel.x(),
-                 pixel.y(),
-                 normal.x(),
-                 normal.y(),
-                 static_cast<float>(1e-6 * s.speed_px_s),
-                 static_cast<float>(1e-12 * s.curvature_px_s2),
-                 static_cast<float>(lateness(s, true)),
-                 static_cast<float>(lateness(s, false)),
+    const double fade = std::min(1.0, std::abs(s.speed_px_s) / std::max(config_.lateness_from_px_s, 1e-9));
+    const ContrastMemory::Lateness late = contrast_.lateness(s.piece);
+    const double towards = config_.lateness ? std::copysign(fade, s.speed_px_s) : 0;
+    lines_[i] = {static_cast<float>(towards * late.on_px),
+                 static_cast<float>(towards * late.off_px),
                  static_cast<float>(gate),
                  static_cast<float>(-0.5 / variance),
                  static_cast<float>(odds),
@@ -111,7 +101,7 @@ void EventAlignment::prepare(const EventAlignmentProblem& p) {
                  static_cast<std::int8_t>(polarity_is_wrong(s, -forward)),
                  static_cast<std::int8_t>(forward)};
   }
-  strips_.claim(areas_);
+  index_.build(strips_, static_cast<float>(1e6 * p.span_s));
 }
 
 void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentResult* result) {
@@ -120,14 +110,11 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
   slope_ = {keep * slope_.weight, keep * slope_.inside, keep * slope_.at_gate};
   const auto count_px = static_cast<float>(config_.count_px);
   for (const FrontEvent& e : p.events) {
-    const std::int32_t i = strips_.owner(e.x, e.y);
-    if (i < 0) continue;
-    const Line& line = lines_[static_cast<std::size_t>(i)];
-    Sum& sum = sums_[static_cast<std::size_t>(i)];
-    const auto age_us = static_cast<float>(p.now_us - e.stamp_us);
-    const float d = line.nx * (static_cast<float>(e.x) - line.x) +
-                    line.ny * (static_cast<float>(e.y) - line.y) +
-                    (line.speed - line.curvature * age_us) * age_us + (e.on ? line.late_on : line.late_off);
+    const StripIndex::Owner owner = index_.find(e.x, e.y, static_cast<float>(p.now_us - e.stamp_us));
+    if (owner.strip < 0) continue;
+    const Line& line = lines_[static_cast<std::size_t>(owner.strip)];
+    Sum& sum = sums_[static_cast<std::size_t>(owner.strip)];
+    const float d = owner.distance + (e.on ? line.late_on : line.late_off);
     if (std::abs(d) <= count_px) sum.net += e.on ? line.forward : -line.forward;
     if (std::abs(d) > line.gate) continue;
     if (config_.polarity && (e.on ? line.wrong_on : line.wrong_off)) {
@@ -145,15 +132,36 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
   }
 }
 
-/// Tells the contrast memory what area each piece has swept, claimed length times way, and what events fell
+/// Whether the strip owns one place in it, another at every call.
+bool EventAlignment::owns_a_place(std::size_t sample, float half_span_us) const {
+  const auto share = [](float step, std::uint64_t k) {
+    const float v = step * static_cast<float>(k % 4096);
+    return 2 * (v - std::floor(v)) - 1;
+  };
+  const std::uint64_t k = 17 * sample + call_ / kShareOut;
+  const Strip& s = strips_[sample];
+  const float along = share(0.7548777F, k) * static_cast<float>(config_.strip_px);
+  const float across = share(0.5698403F, k) * static_cast<float>(config_.count_px) -
+                       (s.speed - s.curvature * half_span_us) * half_span_us;
+  const float x = s.x + across * s.nx - along * s.ny, y = s.y + across * s.ny + along * s.nx;
+  if (!(x >= 0 && y >= 0 && x <= static_cast<float>(size_.width - 1) &&
+        y <= static_cast<float>(size_.height - 1)))
+    return false;
+  return index_.find(x, y, half_span_us).strip == static_cast<std::int32_t>(sample);
+}
+
+/// Tells the contrast memory what area each piece has swept, owned length times way, and what events fell
 /// there.
 void EventAlignment::learn_contrast(const EventAlignmentProblem& p) {
+  ++call_;
+  const auto half_span_us = static_cast<float>(0.5e6 * p.span_s);
+  const double swept_s = kShareOut * p.span_s;
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
     const ContourSample& s = p.samples[i];
-    const double way = std::abs(s.speed_px_s) * p.span_s;
-    const double length = strips_.claimed()[i] / (2.0 * areas_[i].reach);
-    contrast_.sweep(s.piece, length * way);
-    contrast_.count(s.piece, sums_[i].net);
+    // Places tell on average what share a strip owns; a part of the strips is asked in each call.
+    if ((i + call_) % kShareOut == 0 && owns_a_place(i, half_span_us))
+      contrast_.sweep(s.piece, 2 * config_.strip_px * std::abs(s.speed_px_s) * swept_s);
+    if (sums_[i].net != 0) contrast_.count(s.piece, sums_[i].net);
   }
 }
 

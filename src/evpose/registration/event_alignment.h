@@ -11,7 +11,7 @@
 #include "evpose/core/pose.h"
 #include "evpose/event/event_front.h"
 #include "evpose/registration/contrast_memory.h"
-#include "evpose/registration/strip_map.h"
+#include "evpose/registration/strip_index.h"
 
 namespace evpose {
 
@@ -20,8 +20,6 @@ class ConfigTable;
 struct EventAlignmentConfig {
   double gate_px = 0.5;  ///< an event belongs to a contour within this distance and two sigma of the map
   double widest_gate_px = 0.55;    ///< ... opened by two sigma of the prediction, but to no more than this
-  double capture_gate_px = 6;      ///< ... and to no more than this while the events in it show no contour
-  double capture_below = 0.3;      ///< ... that is, while their slope is less than this
   double event_sigma_px = 0.7;     ///< scatter of a contour's events about it
   double shared_sigma_px = 0.35;   ///< error that neighbouring events share (clutter, lateness)
   double shared_s = 0.05;          ///< ... and that lasts so long
@@ -97,8 +95,6 @@ class EventAlignment {
  private:
   /// What an event needs to know of the sample that it belongs to.
   struct Line {
-    float x, y, nx, ny;
-    float speed, curvature;           ///< px/us, px/us^2
     float late_on, late_off;          ///< px, along the normal
     float gate;                       ///< px
     float exponent, odds;             ///< exp(exponent d^2) * odds: of the contour against clutter
@@ -124,19 +120,20 @@ class EventAlignment {
   std::uint32_t cluster_of(const ContourSample& sample) const;
   bool captured() const;
   bool polarity_is_wrong(const ContourSample& sample, int sign) const;
-  double lateness(const ContourSample& sample, bool on) const;
+  bool owns_a_place(std::size_t sample, float half_span_us) const;
 
   ImageSize size_;
   EventAlignmentConfig config_;
-  StripMap strips_;
+  StripIndex index_;
   ContrastMemory contrast_;
   Slope slope_;
   // Of the last call, one for each sample; kept so that nothing is allocated from call to call.
-  std::vector<Strip> areas_;
+  std::vector<Strip> strips_;
   std::vector<Line> lines_;
   std::vector<Sum> sums_;
   std::vector<Cluster> clusters_;
   std::vector<std::uint32_t> cluster_numbers_;
+  std::uint32_t call_ = 0;
 };
 
 }  // namespace evpose

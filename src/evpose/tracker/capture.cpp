@@ -87,7 +87,7 @@ void Capture::begin(TimeNs t, const NavState& state, const Matrix6d& covariance)
     all_visible_ = std::make_unique<VisibleSet>(index_, camera_, close);
     for (const double gate_px : kGates_px) {
       EventAlignmentConfig stage;
-      stage.gate_px = stage.widest_gate_px = stage.capture_gate_px = gate_px;
+      stage.gate_px = stage.widest_gate_px = gate_px;
       stage.count_px = 0.1;
       stage.polarity = stage.honest_slope = false;
       stages_.push_back(std::make_unique<EventAlignment>(camera_.size(), stage, pieces_.count));

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/strip_index.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace evpose {
+namespace {
+
+constexpr ImageSize kSize{160, 120};
+constexpr float kHalfLength_px = 4, kAmbiguity_px = 1, kSpan_us = 5000;
+
+struct Place {
+  float x, y, age_us;
+};
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : random_(seed) {}
+  float in(float low, float high) { return low + (high - low) * u_(random_); }
+  Strip strip() {
+    const float a = in(0, 6.28F);
+    return {in(-10, 170),      in(-10, 130),      std::cos(a), std::sin(a),
+            in(-2e-3F, 2e-3F), in(-2e-8F, 2e-8F), in(0.5F, 6)};
+  }
+  Place place() { return {in(0, 159), in(0, 119), in(0, kSpan_us)}; }
+
+ private:
+  std::mt19937 random_;
+  std::uniform_real_distribution<float> u_{0, 1};
+};
+
+StripIndex index_of(std::span<const Strip> strips) {
+  StripIndex index(kSize, kHalfLength_px, kAmbiguity_px);
+  index.build(strips, kSpan_us);
+  return index;
+}
+
+float distance(const Strip& s, const Place& p) {
+  return s.nx * (p.x - s.x) + s.ny * (p.y - s.y) + s.speed * p.age_us - s.curvature * p.age_us * p.age_us;
+}
+float along(const Strip& s, const Place& p) { return std::abs(s.nx * (p.y - s.y) - s.ny * (p.x - s.x)); }
+bool covers(const Strip& s, const Place& p) {
+  return std::abs(distance(s, p)) <= s.reach && along(s, p) <= kHalfLength_px;
+}
+/// So near to a strip's border that rounding decides.
+bool on_border(const Strip& s, const Place& p) {
+  return std::abs(std::abs(distance(s, p)) - s.reach) < 1e-2F ||
+         std::abs(along(s, p) - kHalfLength_px) < 1e-2F;
+}
+
+TEST(StripIndex, AStripOwnsWhatItCoversAtTheEventsTime) {
+  Random random(1);
+  int covered = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Strip s = random.strip();
+    const StripIndex index = index_of({&s, 1});
+    for (int k = 0; k < 300; ++k) {
+      Place p = random.place();
+      if (k % 2 == 0) {  // near the strip, as few of the others are
+        p.x = std::clamp(s.x + random.in(-12, 12), 0.0F, 159.0F);
+        p.y = std::clamp(s.y + random.in(-12, 12), 0.0F, 119.0F);
+      }
+      if (on_border(s, p)) continue;
+      const auto owner = index.find(p.x, p.y, p.age_us);
+      ASSERT_EQ(owner.strip == 0, covers(s, p)) << p.x << ' ' << p.y << ' ' << p.age_us;
+      if (owner.strip != 0) continue;
+      EXPECT_NEAR(owner.distance, distance(s, p), 1e-3);
+      ++covered;
+    }
+  }
+  EXPECT_GT(covered, 1000);
+}
+
+/// Two strips of different lines: the definition, place by place.
+TEST(StripIndex, BetweenTwoLinesTheNearerOwnsUnlessBothAreAsNear) {
+  Random random(2);
+  int nobody = 0;
+  for (int i = 0; i < 200; ++i) {
+    std::array<Strip, 2> pair{random.strip(), random.strip()};
+    pair[0].x = 80, pair[0].y = 60, pair[1].x = 83, pair[1].y = 58;
+    if (std::abs(pair[0].nx * pair[1].nx + pair[0].ny * pair[1].ny) > 0.97F) continue;
+    const StripIndex index = index_of(pair);
+    for (int k = 0; k < 500; ++k) {
+      const Place p{random.in(65, 95), random.in(45, 75), random.in(0, kSpan_us)};
+      if (on_border(pair[0], p) || on_border(pair[1], p)) continue;
+      const bool a = covers(pair[0], p), b = covers(pair[1], p);
+      const float nearer_by = std::abs(distance(pair[1], p)) - std::abs(distance(pair[0], p));
+      if (std::abs(std::abs(nearer_by) - kAmbiguity_px) < 1e-2F) continue;
+      int expected = a ? 0 : b ? 1 : -1;
+      if (a && b) expected = std::abs(nearer_by) < kAmbiguity_px ? -1 : nearer_by > 0 ? 0 : 1;
+      ASSERT_EQ(index.find(p.x, p.y, p.age_us).strip, expected) << i << ": " << p.x << ' ' << p.y;
+      nobody += a && b && expected == -1;
+    }
+  }
+  EXPECT_GT(nobody, 100);
+}
+
+TEST(StripIndex, NeighboursOfOneLineShareItEvenly) {
+  std::vector<Strip> line;
+  for (int i = 0; i < 10; ++i) line.push_back({80, 20 + 5.0F * static_cast<float>(i), 1, 0, 1e-4F, 0, 2});
+  const StripIndex index = index_of(line);
+  for (float y = 18; y < 67; y += 0.37F)
+    EXPECT_EQ(index.find(80.5F, y, 1000).strip, static_cast<int>(std::lround((y - 20) / 5))) << y;
+}
+
+/// What is found does not depend on the order of the strips.
+TEST(StripIndex, OrderOfTheStripsDoesNotMatter) {
+  Random random(3);
+  std::vector<Strip> strips;
+  for (int i = 0; i < 300; ++i) strips.push_back(random.strip());
+  const std::vector<Strip> reversed(strips.rbegin(), strips.rend());
+  const StripIndex a = index_of(strips), b = index_of(reversed);
+  int owned = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const Place p = random.place();
+    const std::int32_t i = a.find(p.x, p.y, p.age_us).strip, j = b.find(p.x, p.y, p.age_us).strip;
+    ASSERT_EQ(i, j < 0 ? j : 299 - j);
+    owned += i >= 0;
+  }
+  EXPECT_GT(owned, 2000);
+}
+
+TEST(StripIndex, EarlierStripsAreForgotten) {
+  const Strip s{80, 60, 1, 0, 0, 0, 2}, elsewhere{20, 20, 1, 0, 0, 0, 2};
+  StripIndex index = index_of({&s, 1});
+  EXPECT_EQ(index.find(80, 60, 0).strip, 0);
+  index.build({&elsewhere, 1}, kSpan_us);
+  EXPECT_EQ(index.find(80, 60, 0).strip, -1);
+  EXPECT_EQ(index.find(20, 20, 0).strip, 0);
+  index.build({}, kSpan_us);
+  EXPECT_EQ(index.find(20, 20, 0).strip, -1);
+}
+
+TEST(StripIndex, ATangleOfLinesBelongsToNobody) {
+  Random random(4);
+  std::vector<Strip> strips;
+  for (int i = 0; i < 100; ++i) {
+    strips.push_back(random.strip());
+    strips.back().x = 80, strips.back().y = 60, strips.back().speed = strips.back().curvature = 0;
+  }
+  EXPECT_EQ(index_of(strips).find(80, 60, 0).strip, -1);
+}
+
+}  // namespace
+}  // namespace evpose

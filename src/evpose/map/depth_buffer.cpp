@@ -19,25 +19,29 @@ DepthBuffer::DepthBuffer(const Eigen::Vector2d& tangents, double cell)
       cell_(static_cast<float>(cell)),
       columns_(static_cast<int>(2 * tangents.x() / cell) + 1),
       rows_(static_cast<int>(2 * tangents.y() / cell) + 1) {
-  cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  inverse_depths_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  surfaces_.resize(inverse_depths_.size());
 }
 
 void DepthBuffer::start(const ContourMap& map, const Pose& T_map_cam, double near_m) {
-  std::fill(cells_.begin(), cells_.end(), Cell{0, Eigen::Vector3f::Zero()});
+  std::fill(inverse_depths_.begin(), inverse_depths_.end(), 0.0F);
+  slopes_.clear();
   const Pose T_cam_map = T_map_cam.inverse();
   R_cam_map_ = T_cam_map.rotation().cast<float>();
   offset_ = (T_cam_map * map.anchor).cast<float>();
   near_m_ = static_cast<float>(near_m);
 }
 
-void DepthBuffer::draw(const ContourMap& map, std::span<const std::uint32_t> triangles) {
+std::size_t DepthBuffer::draw(const ContourMap& map, std::span<const std::uint32_t> triangles) {
+  std::size_t filled = 0;
   const TriangleMesh& mesh = map.occluders;
   for (const std::uint32_t number : triangles) {
     Eigen::Vector3f corners[3];
     for (std::size_t k = 0; k < 3; ++k)
       corners[k] = R_cam_map_ * mesh.vertices[mesh.triangles[number][k]] + offset_;
-    clip_and_draw(corners);
+    filled += clip_and_draw(corners);
   }
+  return filled;
 }
 
 void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double near_m) {
@@ -47,7 +51,7 @@ void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double ne
   draw(map, all);
 }
 
-void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners) {
+std::size_t DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners) {
   Eigen::Vector3f kept[4];
   int n = 0;
   for (int i = 0; i < 3; ++i) {
@@ -57,16 +61,21 @@ void DepthBuffer::clip_and_draw(const Eigen::Vector3f* corners) {
     if ((a.z() >= near_m_) != (b.z() >= near_m_))
       kept[n++] = a + (near_m_ - a.z()) / (b.z() - a.z()) * (b - a);
   }
-  if (n < 3) return;
+  if (n < 3) return 0;
   // The plane n.x = d gives 1 / z = n.(x / z, y / z, 1) / d; planes through the eye are seen edge-on.
   const Eigen::Vector3f normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
   const float distance = normal.dot(corners[0]);
-  if (!(std::abs(distance) > 1e-4F)) return;
-  for (int i = 2; i < n; ++i) draw(kept[0], kept[i - 1], kept[i], normal / distance);
+  if (!(std::abs(distance) > 1e-4F)) return 0;
+  std::size_t filled = 0;
+  for (int i = 2; i < n; ++i) filled += draw(kept[0], kept[i - 1], kept[i], normal / distance);
+  return filled;
 }
 
-void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c,
-                       const Eigen::Vector3f& slope) {
+std::size_t DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c,
+                              const Eigen::Vector3f& slope) {
+  const auto surface = static_cast<std::uint32_t>(slopes_.size());
+  slopes_.push_back(slope);
+  std::size_t filled = 0;
   // To grid coordinates (cell centres at whole numbers); 1 / z is linear over the grid.
   for (Eigen::Vector3f* v : {&a, &b, &c}) {
     const float w = 1 / v->z();
@@ -88,14 +97,23 @@ void DepthBuffer::draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c,
     const float x0 = std::max(std::ceil(left), 0.0F),
                 x1 = std::min(std::floor(right), static_cast<float>(columns_ - 1));
     if (!(x0 <= x1)) continue;
-    const float v = (y + 0.5F) * cell_ - tangents_.y(), row_part = slope.y() * v + slope.z();
-    Cell* cell = &cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
-                         static_cast<std::size_t>(x0)];
-    for (float x = x0; x <= x1; ++x, ++cell) {
-      const float w = slope.x() * ((x + 0.5F) * cell_ - tangents_.x()) + row_part;
-      if (w > cell->inverse_depth) *cell = {w, slope};
+    const float v = (y + 0.5F) * cell_ - tangents_.y();
+    const float step = slope.x() * cell_,
+                first = slope.x() * ((x0 + 0.5F) * cell_ - tangents_.x()) + slope.y() * v + slope.z();
+    const std::size_t at =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(x0);
+    float* const depth = inverse_depths_.data() + at;
+    std::uint32_t* const owner = surfaces_.data() + at;
+    const int count = static_cast<int>(x1 - x0) + 1;
+    for (int k = 0; k < count; ++k) {
+      const float w = first + step * static_cast<float>(k);
+      const bool nearer = w > depth[k];
+      depth[k] = nearer ? w : depth[k];
+      owner[k] = nearer ? surface : owner[k];
     }
+    filled += static_cast<std::size_t>(count);
   }
+  return filled;
 }
 
 bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
@@ -103,19 +121,15 @@ bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
   const Eigen::Vector3f ray = (point_cam / point_cam.z()).cast<float>();
   const float x = (ray.x() + tangents_.x()) / cell_ - 0.5F, y = (ray.y() + tangents_.y()) / cell_ - 0.5F;
   const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
-  const auto cell = [&](int c, int r) -> const Cell* {
-    if (c < 0 || r < 0 || c >= columns_ || r >= rows_) return nullptr;
-    return &cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
-                   static_cast<std::size_t>(c)];
-  };
   // The four cells around the point are asked at the point itself, those further out for silhouettes.
-  for (int r = row - 1; r <= row + 2; ++r)
-    for (int c = column - 1; c <= column + 2; ++c) {
-      const Cell* const near = cell(c, r);
-      if (near == nullptr || !(near->inverse_depth > 0)) continue;
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 2, rows_ - 1); ++r)
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 2, columns_ - 1); ++c) {
+      const std::size_t at =
+          static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c);
+      if (!(inverse_depths_[at] > 0)) continue;
+      if (inverse_depths_[at] * (z - kSilhouetteShare * z) > 1) return true;
       const bool around = r >= row && r <= row + 1 && c >= column && c <= column + 1;
-      if (around && near->slope.dot(ray) * (z - kSlack_m - kSlackShare * z) > 1) return true;
-      if (near->inverse_depth * (z - kSilhouetteShare * z) > 1) return true;
+      if (around && slopes_[surfaces_[at]].dot(ray) * (z - kSlack_m - kSlackShare * z) > 1) return true;
     }
   return false;
 }

@@ -20,8 +20,9 @@ class DepthBuffer {
 
   /// Empties the grid and looks from a new place.
   void start(const ContourMap& map, const Pose& T_map_cam, double near_m);
-  /// Draws triangles of that map, by number; what is nearer than `near_m` is cut off.
-  void draw(const ContourMap& map, std::span<const std::uint32_t> triangles);
+  /// Draws triangles of that map, by number; what is nearer than `near_m` is cut off. Returns how many cells
+  /// were filled.
+  std::size_t draw(const ContourMap& map, std::span<const std::uint32_t> triangles);
   /// Both, with all triangles.
   void render(const ContourMap& map, const Pose& T_map_cam, double near_m);
 
@@ -31,18 +32,16 @@ class DepthBuffer {
   bool hides(const Eigen::Vector3d& point_cam) const;
 
  private:
-  /// A surface seen in the grid: at (x / z, y / z) its 1 / z is slope . (x / z, y / z, 1).
-  struct Cell {
-    float inverse_depth;  ///< of the nearest surface at the cell's centre, 0: none
-    Eigen::Vector3f slope;
-  };
-  void draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);
-  void clip_and_draw(const Eigen::Vector3f* corners);
+  std::size_t draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);
+  std::size_t clip_and_draw(const Eigen::Vector3f* corners);
 
   Eigen::Vector2f tangents_;
   float cell_;
   int columns_, rows_;
-  std::vector<Cell> cells_;
+  std::vector<float> inverse_depths_;    ///< of the nearest surface at each cell's centre, 0: none
+  std::vector<std::uint32_t> surfaces_;  ///< its number
+  /// Of the surfaces: at (x / z, y / z) its 1 / z is slope . (x / z, y / z, 1).
+  std::vector<Eigen::Vector3f> slopes_;
   Eigen::Matrix3f R_cam_map_;
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
   float near_m_ = 0;

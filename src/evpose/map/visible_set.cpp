@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <unordered_set>
 
 #include "evpose/core/config.h"
 
@@ -14,6 +16,8 @@ constexpr int kBlockCubes = 8;                 // a block is 8 x 8 x 8 cubes
 constexpr float kOccluderCubes = 4;            // triangles are gathered in boxes of 4 x 4 x 4 cubes ...
 constexpr std::uint32_t kMostOccluders = 256;  // ... and by so many
 constexpr double kBegin = 0.7;                 // of the way to a refresh, the next choice is begun
+constexpr float kLookedAt = 0.4F;              // of the stride, in the image: spacing of the points looked at
+constexpr std::size_t kCellsAPoint = 200;      // filled in the time that a point takes
 constexpr double kDepthCell_px = 2;            // of the occluders' depth buffer
 // Two points are on one contour of the image if their directions and offsets agree this well.
 constexpr float kSameDirectionSin = 0.2F;
@@ -26,6 +30,23 @@ std::uint32_t priority_of(std::uint32_t point) {
   h ^= h >> 15;
   h *= 0x85EBCA77u;
   return h ^ (h >> 13);
+}
+
+/// Key of a short stretch of a contour, `length` long, a quarter of it wide, in its direction.
+std::uint64_t stretch_of(const ContourPoint& p, float length) {
+  int axis = 0;
+  p.tangent.cwiseAbs().maxCoeff(&axis);
+  const float sign = p.tangent[axis] < 0 ? -1.0F : 1.0F;
+  std::uint64_t key = static_cast<std::uint64_t>(axis);
+  const auto mix = [&key](float v) {
+    key = (key ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v)))) * 0x9E3779B97F4A7C15u;
+    key ^= key >> 29;
+  };
+  for (int k = 0; k < 3; ++k) {
+    mix(std::clamp(p.position[k] / (k == axis ? length : 0.25F * length), -1e15F, 1e15F));
+    if (k != axis) mix(4 * sign * p.tangent[k] + 0.5F);
+  }
+  return key;
 }
 
 std::int64_t key_of(const Eigen::Vector3f& p, float edge) {
@@ -111,7 +132,8 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
       std::uint32_t end = i;
       while (end < block_end && keys[order_[end]].cube == keys[order_[i]].cube) ++end;
       const Sphere s = bound(i, end, position);
-      cubes_.push_back({s.centre, s.radius, i, end});
+      cubes_.push_back({s.centre, s.radius, i, end, {}});
+      sort_by_level(cubes_.back());
       i = end;
     }
     blocks_.push_back({keys[order_[begin]].block, first_cube, static_cast<std::uint32_t>(cubes_.size()),
@@ -119,6 +141,31 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
     begin = block_end;
   }
   sort_occluders();
+}
+
+void ContourIndex::sort_by_level(Cube& cube) {
+  const auto at = [this](std::uint32_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
+  std::uint32_t done = cube.begin;
+  float spacing = kCoarsest_m;
+  std::unordered_set<std::uint64_t> taken;
+  for (std::uint32_t& end : cube.level_end) {
+    taken.clear();
+    for (auto i = at(cube.begin); i != at(done); ++i) taken.insert(stretch_of(map_.points[*i], spacing));
+    const auto rest = std::stable_partition(at(done), at(cube.end), [&](std::uint32_t number) {
+      return taken.insert(stretch_of(map_.points[number], spacing)).second;
+    });
+    end = done = static_cast<std::uint32_t>(rest - order_.begin());
+    spacing *= 0.5F;
+  }
+}
+
+std::uint32_t ContourIndex::Cube::end_for(float spacing_m) const {
+  float spacing = kCoarsest_m;
+  for (const std::uint32_t e : level_end) {
+    if (spacing <= spacing_m) return e;
+    spacing *= 0.5F;
+  }
+  return end;
 }
 
 void ContourIndex::sort_occluders() {
@@ -211,7 +258,7 @@ const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
   if (moved > config_.refresh_px) {
     // Too late for slices, unless what is under way is of this place.
     if (!under_way_ || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px) start(T_map_cam);
-    work(remaining_);
+    work(std::numeric_limits<std::size_t>::max());
   } else if (under_way_ || moved > kBegin * config_.refresh_px) {
     if (!under_way_) start(T_map_cam);
     // In equal slices until the move is complete, as far as it goes on like this.
@@ -260,23 +307,35 @@ void VisibleSet::start(const Pose& T_map_cam) {
     const auto& cube = index_.cubes()[i];
     return outside_cone(R_cam_map_ * cube.centre + offset_, cube.radius);
   });
-  for (const std::uint32_t i : cubes_) remaining_ += index_.cubes()[i].end - index_.cubes()[i].begin;
+  for (const std::uint32_t i : cubes_) remaining_ += wanted(index_.cubes()[i]) - index_.cubes()[i].begin;
+  remaining_ = std::max(remaining_, effort_);
+  effort_ = 0;
+}
+
+/// Of a cube no more points are looked at than its distance asks for.
+std::uint32_t VisibleSet::wanted(const ContourIndex::Cube& cube) const {
+  const float distance = (R_cam_map_ * cube.centre + offset_).norm() - cube.radius;
+  return cube.end_for(kLookedAt * static_cast<float>(config_.stride_px / camera_.focal_px()) *
+                      std::max(distance, static_cast<float>(config_.near_m)));
 }
 
 void VisibleSet::work(std::size_t most) {
   std::size_t done = 0;
   while (done < most && occluders_done_ < occluders_.size()) {
     const auto& block = index_.occluders()[occluders_[occluders_done_++]];
-    depth_.draw(index_.map(),
-                std::span(index_.occluder_order()).subspan(block.begin, block.end - block.begin));
+    done += depth_.draw(index_.map(),
+                        std::span(index_.occluder_order()).subspan(block.begin, block.end - block.begin)) /
+            kCellsAPoint;
     done += block.end - block.begin;
   }
   while (done < most && cubes_done_ < cubes_.size()) {
     const auto& cube = index_.cubes()[cubes_[cubes_done_++]];
-    for (std::uint32_t k = cube.begin; k < cube.end; ++k) look_at(index_.order()[k]);
-    done += cube.end - cube.begin;
+    const std::uint32_t end = wanted(cube);
+    for (std::uint32_t k = cube.begin; k < end; ++k) look_at(index_.order()[k]);
+    done += end - cube.begin;
   }
   remaining_ -= std::min(remaining_, done);
+  effort_ += done;
   if (occluders_done_ == occluders_.size() && cubes_done_ == cubes_.size()) finish();
 }
 

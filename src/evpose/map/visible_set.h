@@ -22,10 +22,19 @@ class ContourIndex {
   /// Keeps a reference to `map`. `cube_m`: edge of a cube.
   explicit ContourIndex(const ContourMap& map, double cube_m = 0.5);
 
+  /// Inside a cube the points come from coarse to fine: first some that lie 16 cm apart along the contours,
+  /// then those that make it 8 cm, and so on.
+  static constexpr int kLevels = 5;
+  static constexpr float kCoarsest_m = 0.16F;
+
   struct Cube {
     Eigen::Vector3f centre;    ///< of its points' bounding box, relative to the map's anchor
     float radius;              ///< of the sphere around its points, metres
     std::uint32_t begin, end;  ///< range of order()
+    std::uint32_t level_end[kLevels];
+
+    /// End of a range that begins at `begin` and holds points at about `spacing_m` along every contour.
+    std::uint32_t end_for(float spacing_m) const;
   };
   const std::vector<Cube>& cubes() const { return cubes_; }
   /// Point numbers of the map, cube after cube.
@@ -58,6 +67,7 @@ class ContourIndex {
   std::vector<Cube> cubes_;
   std::vector<BlockRange> blocks_;
   std::vector<std::uint32_t> order_;
+  void sort_by_level(Cube& cube);
   void sort_occluders();
   std::vector<Occluders> occluders_;
   std::vector<std::uint32_t> occluder_order_;
@@ -70,7 +80,7 @@ struct VisibleSetConfig {
   int budget = 6000;      ///< most points in all
   double margin_px = 12;  ///< points may lie this far outside of the image when chosen
   double refresh_px = 8;  ///< chosen again before the view has moved by this much
-  int slice = 4000;       ///< points and triangles looked at per update meanwhile, if that is fast enough
+  int slice = 500;        ///< points and triangles looked at per update meanwhile, if that is fast enough
   bool occlusion = true;  ///< leave out points behind the map's occluders, if it has any
   double grazing_sin =
       0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
@@ -96,6 +106,7 @@ class VisibleSet {
   void start(const Pose& T_map_cam);
   /// Looks at so many triangles and points, or a few more; the last slice puts the new choice into points_.
   void work(std::size_t most);
+  std::uint32_t wanted(const ContourIndex::Cube& cube) const;
   void look_at(std::uint32_t number);
   void finish();
   bool outside_cone(const Eigen::Vector3f& centre_cam, float radius) const;
@@ -117,6 +128,7 @@ class VisibleSet {
   Pose next_T_map_cam_;
   Eigen::Matrix3f R_cam_map_;
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
+  std::size_t effort_ = 0;  ///< that it took so far
   DepthBuffer depth_;
   std::vector<std::uint32_t> occluders_, cubes_;  ///< in view, what is left to look at
   std::size_t occluders_done_ = 0, cubes_done_ = 0, remaining_ = 0;

@@ -38,14 +38,14 @@ void EventFront::rebase(std::uint32_t shift_us) {
 }
 
 void EventFront::take(const EventPacket& packet, std::span<const Event> events) {
+  if (events.empty()) return;
   const int width = surface_.width(), height = surface_.height();
+  std::int64_t base_us = clock_.microseconds(packet.time(events.front())) - events.front().dt_us;
+  std::size_t drawn = kept_.size();
   for (std::size_t i = 0; i < events.size(); ++i) {
     if (i + kAhead < events.size()) {
       const Event& later = events[i + kAhead];
-      if (later.x < width && later.y < height) {
-        filter_.prefetch(later.x, later.y);
-        surface_.prefetch(later.x, later.y, polarity_of(later));
-      }
+      if (later.x < width && later.y < height) filter_.prefetch(later.x, later.y);
     }
     const Event& e = events[i];
     ++counts_.read;
@@ -53,12 +53,23 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
       ++counts_.outside;
       continue;
     }
-    const std::uint32_t stamp = clock_.stamp(packet.time(e), [this](std::uint32_t shift) { rebase(shift); });
+    if (base_us + e.dt_us > StampClock::kLargest) {
+      clock_.stamp(packet.time(e), [this](std::uint32_t shift) { rebase(shift); });
+      base_us = clock_.microseconds(packet.time(e)) - e.dt_us;
+    }
+    const auto stamp = static_cast<std::uint32_t>(std::max<std::int64_t>(base_us + e.dt_us, 1));
     if (!filter_.keep(e.x, e.y, e.on != 0, stamp)) continue;
     ++counts_.kept;
     kept_.push_back({stamp, e.x, e.y, e.on});
-    surface_.insert(e.x, e.y, polarity_of(e), stamp, burst_us_);
+    surface_.prefetch(e.x, e.y, polarity_of(e));
+    // The surface follows some events behind, when its memory has answered.
+    if (kept_.size() - drawn > kAhead) draw(kept_[drawn++]);
   }
+  while (drawn < kept_.size()) draw(kept_[drawn++]);
+}
+
+void EventFront::draw(const FrontEvent& e) {
+  surface_.insert(e.x, e.y, e.on != 0 ? Polarity::on : Polarity::off, e.stamp_us, burst_us_);
 }
 
 }  // namespace evpose

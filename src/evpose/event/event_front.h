@@ -54,6 +54,7 @@ class EventFront {
 
  private:
   void rebase(std::uint32_t shift_us);
+  void draw(const FrontEvent& event);
 
   EventFrontConfig config_;
   StampClock clock_;

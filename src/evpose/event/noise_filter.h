@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "evpose/core/huge_pages.h"
 #include "evpose/core/time.h"
 
 namespace evpose {
@@ -99,7 +100,7 @@ class NoiseFilter {
   std::size_t stride_;
   std::uint32_t support_us_;
   std::uint32_t second_end_us_ = 0;
-  std::vector<Cell> cells_;             ///< with a border of one pixel
+  RandomAccessTable<Cell> cells_;       ///< with a border of one pixel
   std::vector<std::uint32_t> last_on_;  ///< of on events, if same_polarity; the cells' are of off events then
   std::vector<Pixel> hot_;
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "evpose/core/huge_pages.h"
 #include "evpose/core/time.h"
 
 namespace evpose {
@@ -12,6 +13,8 @@ namespace evpose {
 /// Shared by filter and surfaces, so that a stamp is made once per event.
 class StampClock {
  public:
+  static constexpr std::int64_t kLargest = 0x7FFFFFFF;  ///< stamp
+
   /// Stamp of a time; at least 1. `rebase` is called with the amount to subtract from every stored stamp when
   /// the clock has moved so far that stamps would overflow (about every half hour of data).
   template <class Rebase>
@@ -26,6 +29,12 @@ class StampClock {
     }
     return us < 1 ? 1u : static_cast<std::uint32_t>(us);
   }
+  /// Microseconds on the clock, not clamped, rounded down; the clock starts at the first time it hears of.
+  std::int64_t microseconds(TimeNs t) {
+    if (!started_) start(t);
+    const std::int64_t ns = t - zero_;
+    return ns / kNsPerUs - (ns % kNsPerUs < 0 ? 1 : 0);
+  }
   /// Stamp for reading only: clamped to the clock's range.
   std::uint32_t at(TimeNs t) const {
     const std::int64_t us = (t - zero_) / kNsPerUs;
@@ -33,7 +42,6 @@ class StampClock {
   }
 
  private:
-  static constexpr std::int64_t kLargest = 0x7FFFFFFF;
   static constexpr std::int64_t kKept = 60'000'000;  ///< a minute of history survives a rebase
   static constexpr std::int64_t kLeadIn = 1;         ///< the first stamp must not be 0
   void start(TimeNs t) {
@@ -93,7 +101,7 @@ class TimeSurface {
   }
   int width_, height_;
   std::size_t stride_;
-  std::vector<Cell> cells_[2];
+  RandomAccessTable<Cell> cells_[2];
 };
 
 }  // namespace evpose

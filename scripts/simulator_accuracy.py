@@ -91,7 +91,8 @@ def main():
     a = arguments.parse_args()
     a.recordings.mkdir(parents=True, exist_ok=True)
     flights = [(f"{s}, 1280x720", s, LARGE, []) for s in PLAIN]
-    flights += [(s, s, SMALL, []) for s in PLAIN + SPEEDS + HARD]
+    lamps = [f"lamps.off_at_s={0.4 * a.seconds}", f"lamps.on_at_s={0.7 * a.seconds}"]
+    flights += [(s, s, SMALL + (lamps if s == "hdr_lights_off" else []), []) for s in PLAIN + SPEEDS + HARD]
     flights += [(f"imu_1khz, {rate} Hz", "imu_1khz", SMALL, ["--set", f"rate_hz={rate}"])
                 for rate in (100, 200, 300, 1000)]
     flights += [(f"{s}, map {mm} mm off", s, SMALL, mm) for mm in (3, 5) for s in PLAIN]

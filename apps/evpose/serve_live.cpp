@@ -236,7 +236,7 @@ Expected<RunOutcome> finish(RunFolder& run, const TrackJob& job, const ServeRequ
   RunSummary summary = summarise(job, request.track, *session.tracker());
   summary.events_read = session.counts().events - session.counts().events_shed;
   summary.events_kept += session.counts().events_kept;
-  summary.events_shed = queue.counts().events_shed + session.counts().events_shed;
+  summary.events_shed += queue.counts().events_shed + session.counts().events_shed;
   summary.wall_s = wall_s() - wall_start;
   summary.cpu_s = cpu_s() - cpu_start;
   summary.peak_memory_mb = peak_memory_mb();

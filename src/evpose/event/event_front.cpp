@@ -9,13 +9,15 @@ namespace evpose {
 namespace {
 constexpr double kLongestBurst_s = 0.1;
 constexpr double kShortestBurst_s = 1e-3;
-constexpr std::size_t kAhead = 16;  // events; as long as memory takes to answer
+constexpr double kAllowed_us = 5000;  // of the limit's rate may come at once
+constexpr std::size_t kAhead = 16;    // events; as long as memory takes to answer
 
 Polarity polarity_of(const Event& e) { return e.on ? Polarity::on : Polarity::off; }
 }  // namespace
 
 void describe(ConfigTable& table, EventFrontConfig& c) {
   table.group("filter", c.filter);
+  table.add("most_mev_s", c.most_mev_s, "Mev/s", "events are shed beyond this rate; 0: never", {0, 1e5});
   table.add("burst_px", c.burst_px, "px", "quiet time, as predicted motion, that ends a pixel's burst",
             {0.01, 100});
 }
@@ -34,6 +36,7 @@ void EventFront::set_motion(double flow_px_per_s) {
 void EventFront::rebase(std::uint32_t shift_us) {
   filter_.rebase(shift_us);
   surface_.rebase(shift_us);
+  refilled_us_ = refilled_us_ > shift_us ? refilled_us_ - shift_us : 0;
   for (FrontEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
 
@@ -58,6 +61,10 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
       base_us = clock_.microseconds(packet.time(e)) - e.dt_us;
     }
     const auto stamp = static_cast<std::uint32_t>(std::max<std::int64_t>(base_us + e.dt_us, 1));
+    if (config_.most_mev_s > 0 && shed(e, stamp)) {
+      ++counts_.shed;
+      continue;
+    }
     if (!filter_.keep(e.x, e.y, e.on != 0, stamp)) continue;
     ++counts_.kept;
     kept_.push_back({stamp, e.x, e.y, e.on});
@@ -66,6 +73,25 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
     if (kept_.size() - drawn > kAhead) draw(kept_[drawn++]);
   }
   while (drawn < kept_.size()) draw(kept_[drawn++]);
+}
+
+/// The fuller the last milliseconds were, the fewer events pass: which of them is by chance, so that no part
+/// of the image or of a burst is preferred, but always the same for the same event.
+bool EventFront::shed(const Event& e, std::uint32_t stamp_us) {
+  const double full = kAllowed_us * config_.most_mev_s;
+  if (refilled_us_ == 0) allowance_ = full;
+  if (stamp_us > refilled_us_) {
+    allowance_ = std::min(full, allowance_ + config_.most_mev_s * (stamp_us - refilled_us_));
+    refilled_us_ = stamp_us;
+  }
+  if (allowance_ < 0.5 * full) {
+    std::uint32_t h = (stamp_us * 0x9E3779B1u) ^ (e.x * 0x85EBCA77u) ^ (e.y * 0xC2B2AE3Du);
+    h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
+    h ^= h >> 13;
+    if (h > allowance_ / (0.5 * full) * 4294967295.0) return true;
+  }
+  allowance_ -= 1;
+  return false;
 }
 
 void EventFront::draw(const FrontEvent& e) {

@@ -15,7 +15,8 @@ class ConfigTable;
 
 struct EventFrontConfig {
   NoiseFilterConfig filter;
-  double burst_px = 1.0;  ///< a quiet time of this much predicted motion ends a pixel's burst, px
+  double most_mev_s = 100;  ///< events are shed beyond this rate, spread evenly; 0: never
+  double burst_px = 1.0;    ///< a quiet time of this much predicted motion ends a pixel's burst, px
 };
 void describe(ConfigTable& table, EventFrontConfig& config);
 
@@ -48,19 +49,22 @@ class EventFront {
   const NoiseFilter& filter() const { return filter_; }
 
   struct Counts {
-    std::int64_t read = 0, kept = 0, outside = 0;
+    std::int64_t read = 0, kept = 0, outside = 0, shed = 0;
   };
   const Counts& counts() const { return counts_; }
 
  private:
   void rebase(std::uint32_t shift_us);
   void draw(const FrontEvent& event);
+  bool shed(const Event& event, std::uint32_t stamp_us);
 
   EventFrontConfig config_;
   StampClock clock_;
   NoiseFilter filter_;
   TimeSurface surface_;
   std::uint32_t burst_us_ = 0;
+  double allowance_ = 0;  ///< events that may come at once now; refilled at the rate's limit
+  std::uint32_t refilled_us_ = 0;
   std::vector<FrontEvent> kept_;
   Counts counts_;
 };

@@ -126,6 +126,35 @@ TEST(EventFront, ClockSurvivesHoursOfData) {
   EXPECT_EQ(front.counts().kept, 200);
 }
 
+/// A burst of 40 Mev/s for 20 ms into a front that takes 4: a bounded number passes, from everywhere.
+TEST(EventFront, ABurstIsShedEvenlyAndCounted) {
+  constexpr int kSide = 64, kEvents = 800'000;
+  EventFrontConfig config;
+  config.most_mev_s = 4;
+  EventFront front(kSide, kSide, config);
+  EventPacket burst;
+  for (int i = 0; i < kEvents; ++i)
+    burst.events.push_back(
+        make_event(static_cast<std::uint32_t>(i / 40), i % kSide, i / kSide % kSide, true));
+  front.take(burst, burst.events);
+  const double passed = static_cast<double>(front.counts().read - front.counts().shed);
+  EXPECT_EQ(front.counts().read, kEvents);
+  EXPECT_GT(passed, 4 * 20000 * 0.9);
+  EXPECT_LT(passed, 4 * (20000 + 5000) * 1.1);
+  int upper = 0;
+  for (const FrontEvent& e : front.kept()) upper += e.y < kSide / 2;
+  EXPECT_NEAR(upper, 0.5 * static_cast<double>(front.kept().size()), 0.02 * passed);
+}
+
+TEST(EventFront, BelowTheLimitNothingIsShed) {
+  EventFrontConfig config;
+  config.most_mev_s = 1;
+  EventFront front(40, 30, config);
+  const EventPacket p = random_events(20000, 40, 30, 2);  // half a million events a second
+  front.take(p, p.events);
+  EXPECT_EQ(front.counts().shed, 0);
+}
+
 TEST(EventFront, EventsOutsideTheImageAreCountedAndLeftOut) {
   EventFront front(10, 10, {});
   const auto p = packet(0, {{0, 10, 4, 1}, {1, 4, 10, 1}, {2, 40000, 9, 1}});

@@ -39,6 +39,7 @@ void describe(ConfigTable& table, EventAlignmentConfig& c) {
   table.add("buffer_sigma", c.buffer_sigma, "", "... and the normal flow so many sigma from zero", {0, 100});
   table.add("count_px", c.count_px, "px", "events so near teach the contrast", {0.1, 10});
   table.group("contrast", c.contrast);
+  table.group("drift", c.drift);
   table.add("strip_px", c.strip_px, "px", "half length along the contour that a sample stands for", {1, 64});
   table.add("ambiguity_px", c.ambiguity_px, "px",
             "events between two contours as similarly near as this are left out", {0, 50});
@@ -51,7 +52,8 @@ EventAlignment::EventAlignment(ImageSize size, const EventAlignmentConfig& confi
     : size_(size),
       config_(config),
       index_(size, config.strip_px, config.ambiguity_px),
-      contrast_(pieces, config.contrast) {}
+      contrast_(pieces, config.contrast),
+      drift_(config.drift) {}
 
 double EventAlignment::Slope::value() const {
   return weight > 0 ? std::clamp((inside - at_gate) / weight, kLeastSlope, 1.0) : 1;
@@ -109,18 +111,33 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
   const double keep = std::exp(-p.span_s / kSlope_s);
   slope_ = {keep * slope_.weight, keep * slope_.inside, keep * slope_.at_gate};
   const auto count_px = static_cast<float>(config_.count_px);
-  for (const FrontEvent& e : p.events) {
-    const StripIndex::Owner owner = index_.find(e.x, e.y, static_cast<float>(p.now_us - e.stamp_us));
+  if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);
+  if (p.verdicts) owners_.assign(p.events.size(), -1);
+  for (std::size_t k = 0; k < p.events.size(); ++k) {
+    const FrontEvent& e = p.events[k];
+    const auto age_us = static_cast<float>(p.now_us - e.stamp_us);
+    const StripIndex::Owner owner = index_.find(e.x, e.y, age_us);
     if (owner.strip < 0) continue;
+    const auto verdict = [&](EventVerdict v) {
+      if (p.verdicts) (*p.verdicts)[k] = v, owners_[k] = owner.strip;
+    };
     const Line& line = lines_[static_cast<std::size_t>(owner.strip)];
     Sum& sum = sums_[static_cast<std::size_t>(owner.strip)];
     const float d = owner.distance + (e.on ? line.late_on : line.late_off);
-    if (std::abs(d) <= count_px) sum.net += e.on ? line.forward : -line.forward;
+    if (std::abs(d) <= count_px) {
+      sum.net += e.on ? line.forward : -line.forward;
+      const float age_s = 1e-6F * age_us;
+      sum.near.n += 1, sum.near.age += age_s, sum.near.distance += d;
+      sum.near.age2 += age_s * age_s, sum.near.age_distance += age_s * d;
+    }
+    verdict(EventVerdict::beside);
     if (std::abs(d) > line.gate) continue;
     if (config_.polarity && (e.on ? line.wrong_on : line.wrong_off)) {
+      verdict(EventVerdict::wrong_polarity);
       ++result->wrong_polarity;
       continue;
     }
+    verdict(line.wrong_on || line.wrong_off ? EventVerdict::predicted : EventVerdict::contour);
     const float odds = line.odds * std::exp(line.exponent * d * d), w = odds / (1 + odds);
     sum.weight += w;
     sum.offset += w * d;
@@ -176,15 +193,30 @@ std::uint32_t EventAlignment::cluster_of(const ContourSample& s) const {
   return static_cast<std::uint32_t>((cy * columns + cx) * 4 + bin);
 }
 
+/// Numbers the samples' clusters and finds out which of them hold drifting events.
+void EventAlignment::watch_drift(const EventAlignmentProblem& p) {
+  drift_.advance(p.span_s);
+  cluster_numbers_.resize(p.samples.size());
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const ContourSample& s = p.samples[i];
+    DriftMonitor::Events& near = sums_[i].near;
+    if (sums_[i].events == 0 && near.n == 0) continue;
+    cluster_numbers_[i] = cluster_of(s);
+    // Normals of a cluster point into one half of the image.
+    if (s.normal_px.y() < 0) near.distance = -near.distance, near.age_distance = -near.age_distance;
+    drift_.add(cluster_numbers_[i], near, std::abs(s.speed_px_s));
+  }
+}
+
 /// Events of one cluster share errors: its information is capped.
 void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignmentResult* result) {
   const double event_variance = config_.event_sigma_px * config_.event_sigma_px;
-  cluster_numbers_.resize(p.samples.size());
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
     if (sums_[i].events == 0) continue;
-    const std::uint32_t number = cluster_numbers_[i] = cluster_of(p.samples[i]);
+    const std::uint32_t number = cluster_numbers_[i];
     if (number >= clusters_.size()) clusters_.resize(number + 1);
     Cluster& c = clusters_[number];
+    if (c.weight == 0) c.trust = drift_.trust(number);
     c.weight += sums_[i].weight;
     c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
   }
@@ -203,15 +235,26 @@ void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignme
     const double own = event_variance / c.weight;
     const double shared =
         repeats * (config_.shared_sigma_px * config_.shared_sigma_px + c.map_variance / c.weight);
-    const double scale = own / (own + shared) / event_variance;
+    const double scale = c.trust * own / (own + shared) / event_variance;
+    if (c.trust < 0.5) result->drifting += sum.events;
     const Vector6d& J = p.samples[i].jacobian;
     result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * slope * sum.weight);
     result->vector -= scale * sum.offset * J;
   }
   result->information.triangularView<Eigen::StrictlyUpper>() = result->information.transpose();
+  if (p.verdicts) tell_drifting(p);
   for (std::size_t i = 0; i < p.samples.size(); ++i)
     if (sums_[i].events > 0) clusters_[cluster_numbers_[i]] = {};
   result->mean_square_px2 = weight > 0 ? square / weight : 0;
+}
+
+void EventAlignment::tell_drifting(const EventAlignmentProblem& p) {
+  for (std::size_t k = 0; k < p.events.size(); ++k) {
+    EventVerdict& verdict = (*p.verdicts)[k];
+    if (verdict != EventVerdict::contour && verdict != EventVerdict::predicted) continue;
+    const auto sample = static_cast<std::size_t>(owners_[k]);
+    if (clusters_[cluster_numbers_[sample]].trust < 0.5) verdict = EventVerdict::drifting;
+  }
 }
 
 EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
@@ -219,6 +262,7 @@ EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
   prepare(p);
   sum_events(p, &result);
   learn_contrast(p);
+  watch_drift(p);
   weigh_clusters(p, &result);
   result.slope = slope_.weight < kTelling ? 0 : slope_.value();
   result.captured = captured();

@@ -47,7 +47,7 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
     why = e.fault;
   } else if (e.sigma_px > config_.degraded_sigma_px) {
     next = Health::degraded;
-    why = text("pose uncertain by ", e.sigma_px, " px in the weakest direction");
+    why = text("pose uncertain by ", e.sigma_px, " px: ", e.weakest);
   }
   reason->clear();
   if (next != state_) *reason = why;

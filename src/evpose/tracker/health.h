@@ -28,6 +28,7 @@ struct Evidence {
   std::string refused;     ///< why not accepted
   bool searching = false;  ///< the pose is searched: it is not known
   double sigma_px = 0;  ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
+  std::string weakest;  ///< that direction in words
   std::string fault;    ///< what is wrong with the data, if anything
 };
 

@@ -244,6 +244,20 @@ double Tracker::sigma_px() const {
                                               largest(covariance.bottomRightCorner<3, 3>()));
 }
 
+/// The direction of sigma_px(), in words.
+std::string Tracker::weakest_direction() const {
+  const Matrix6d covariance = fusion_->state().pose_covariance();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> position(covariance.topLeftCorner<3, 3>()),
+      rotation(covariance.bottomRightCorner<3, 3>());
+  const bool turns =
+      rotation.eigenvalues()[2] * typical_depth_m_ * typical_depth_m_ > position.eigenvalues()[2];
+  const Eigen::Vector3d axis = turns ? fusion_->state().nav.T_map_body.q * rotation.eigenvectors().col(2)
+                                     : Eigen::Vector3d(position.eigenvectors().col(2));
+  const auto digits = [](double v) { return std::round(100 * v) / 100 + 0.0; };
+  return text(turns ? "rotation about (" : "position along (", digits(axis.x()), ", ", digits(axis.y()), ", ",
+              digits(axis.z()), ") of the map");
+}
+
 /// One update's part of the search for the pose; when it is found, tracking begins there.
 void Tracker::search(TimeNs t) {
   const auto found = capture_.take(t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate);
@@ -295,14 +309,16 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
   const Matrix6d covariance = fusion_->measured_covariance();
   if (config_.field == FieldKind::events) {
-    const EventAlignmentResult r =
-        alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_, covariance});
+    const EventAlignmentResult r = alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_,
+                                                     covariance, verdict_callback_ ? &verdicts_ : nullptr});
+    if (verdict_callback_) verdict_callback_(front_.kept(), verdicts_);
     return {{r.information, r.vector},
             static_cast<int>(samples_.size()),
             r.matched_samples,
             std::sqrt(r.mean_square_px2),
             r.matched_events,
             r.wrong_polarity,
+            r.drifting,
             r.captured,
             r.slope};
   }
@@ -356,12 +372,16 @@ Update Tracker::update(TimeNs t) {
   evidence.refused = searching || refuted ? "searching for the pose" : refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
   evidence.fault = blind ? "no IMU samples" : imu_watch_.fault(t);
+  if (evidence.fault.empty() &&
+      2 * (front_.counts().shed - counted_.shed) > front_.counts().read - counted_.read)
+    evidence.fault = "more events than are taken (events.most_mev_s)";
   if (evidence.fault.empty() && !stpe.captured) evidence.fault = "events do not gather at the contours";
   if (evidence.accepted) fusion_->update(stpe.measurement);  // eq. (5) for the newest state
   setup_.T_body_cam.q = fusion_->calibration().turn * given_q_body_cam_;
 
   const Matrix6d covariance = fusion_->state().pose_covariance();
   evidence.sigma_px = sigma_px();
+  if (evidence.sigma_px > config_.health.degraded_sigma_px) evidence.weakest = weakest_direction();
   out.health = health_.judge(evidence, &out.reason);
   const bool astray = !stpe.captured || (out.health == Health::lost && verify_until_ == 0);
   astray_s_ = astray ? astray_s_ + span_s : 0;
@@ -394,12 +414,14 @@ Update Tracker::update(TimeNs t) {
   out.velocity_covariance = state.covariance.block<3, 3>(6, 6);
   out.accepted = evidence.accepted;
   out.events_read = static_cast<std::int32_t>(front_.counts().read - counted_.read);
+  out.events_shed = static_cast<std::int32_t>(front_.counts().shed - counted_.shed);
   out.events_kept = static_cast<std::int32_t>(front_.counts().kept - counted_.kept);
   out.points = stpe.points;
   out.points_matched = stpe.matched;
   out.residual = stpe.residual;
   out.events_matched = stpe.events;
   out.wrong_polarity = stpe.wrong_polarity;
+  out.drifting = stpe.drifting;
   out.times = {events_time_s_, t1 - t0, t2 - t1, t3 - t2, now() - t3};
   counted_ = front_.counts();
   events_time_s_ = 0;

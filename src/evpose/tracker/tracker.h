@@ -74,6 +74,11 @@ class Tracker {
   /// it, carried on by the IMU. Which update that is does not depend on when samples and packets arrive.
   void on_state(std::function<void(const FusionState&)> callback) { state_callback_ = std::move(callback); }
 
+  /// Called within each update with the events since the last one that passed the filter and what the
+  /// alignment made of them (field: events).
+  using VerdictCallback = std::function<void(std::span<const FrontEvent>, std::span<const EventVerdict>)>;
+  void on_verdicts(VerdictCallback callback) { verdict_callback_ = std::move(callback); }
+
   /// In order of time. An update is made as soon as both streams have passed its time.
   void add_imu(const ImuSample& sample);
   void add_events(const EventPacket& packet);
@@ -114,12 +119,13 @@ class Tracker {
   void tell_states();
   void predict(TimeNs t);
   double sigma_px() const;
+  std::string weakest_direction() const;
   void search(TimeNs t);
   struct Registration {
     PoseInformation measurement;
     int points = 0, matched = 0;
     double residual = 0;
-    int events = 0, wrong_polarity = 0;
+    int events = 0, wrong_polarity = 0, drifting = 0;
     bool captured = true;
     double slope = 1;
   };
@@ -143,6 +149,8 @@ class Tracker {
   HealthMonitor health_;
   std::function<void(const Update&)> callback_;
   std::function<void(const FusionState&)> state_callback_;
+  VerdictCallback verdict_callback_;
+  std::vector<EventVerdict> verdicts_;
   ImuWatch imu_watch_;
   FusionState ahead_;  ///< the state at the last sample told
   ImuSample told_;     ///< that sample; its time is ahead_'s

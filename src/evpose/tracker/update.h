@@ -38,11 +38,13 @@ struct Update {
   std::string reason;               ///< of the health, in words; set when it changed, else empty
   bool accepted = false;            ///< the registration passed the innovation gate and was used
   std::int32_t events_read = 0;     ///< since the last update
+  std::int32_t events_shed = 0;     ///< of these, left out because too many came (events.most_mev_s)
   std::int32_t events_kept = 0;     ///< of these, passed by the noise filter
   std::int32_t points = 0;          ///< chosen map points
   std::int32_t points_matched = 0;  ///< of these, with events near by
   std::int32_t events_matched = 0;  ///< events in the gate (field: events)
   std::int32_t wrong_polarity = 0;  ///< events in the gate left out for their polarity
+  std::int32_t drifting = 0;        ///< events in the gate mistrusted for their drift
   double residual = 0;              ///< RMS of event distances, px (events); of the loss, 0..1 (exponential)
   double innovation = 0;            ///< normalised innovation squared / 6
   StageTimes times;

@@ -224,6 +224,7 @@ void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignme
   const double repeats = std::max(1.0, config_.shared_s / std::max(p.span_s, 1e-6));
   const double slope = config_.honest_slope ? slope_.value() : 1;
   double weight = 0, square = 0;
+  offsets_.clear();
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
     const Sum& sum = sums_[i];
     if (sum.events == 0) continue;
@@ -240,6 +241,8 @@ void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignme
     const Vector6d& J = p.samples[i].jacobian;
     result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * slope * sum.weight);
     result->vector -= scale * sum.offset * J;
+    if (sum.weight > 0)
+      offsets_.push_back({i, -sum.offset / (slope * sum.weight), scale * slope * sum.weight});
   }
   result->information.triangularView<Eigen::StrictlyUpper>() = result->information.transpose();
   if (p.verdicts) tell_drifting(p);

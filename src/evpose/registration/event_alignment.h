@@ -75,6 +75,12 @@ struct EventAlignmentProblem {
   std::vector<EventVerdict>* verdicts = nullptr;  ///< of each event, if asked for
 };
 
+/// What the events of one sample ask for: that the pose moves its contour by `offset_px`.
+struct SampleOffset {
+  std::size_t sample;
+  double offset_px, weight;  ///< weight: px^-2, as it enters the information
+};
+
 struct EventAlignmentResult {
   Matrix6d information = Matrix6d::Zero();  ///< relative to the predicted pose
   Vector6d vector = Vector6d::Zero();       ///< information * offset
@@ -104,6 +110,8 @@ class EventAlignment {
 
   /// The pose comes from elsewhere: how well the events gathered at the contours does not count any more.
   void forget() { slope_ = {}; }
+  /// Of the last call: its information and vector, sample by sample.
+  std::span<const SampleOffset> offsets() const { return offsets_; }
   const ContrastMemory& contrast() const { return contrast_; }
 
  private:
@@ -149,6 +157,7 @@ class EventAlignment {
   std::vector<Strip> strips_;
   std::vector<Line> lines_;
   std::vector<Sum> sums_;
+  std::vector<SampleOffset> offsets_;
   std::vector<Cluster> clusters_;
   std::vector<std::uint32_t> cluster_numbers_;
   std::vector<std::int32_t> owners_;  ///< of the events, if verdicts are asked for

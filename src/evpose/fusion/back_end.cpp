@@ -39,14 +39,31 @@ void describe(ConfigTable& table, FusionConfig& c) {
             "accelerometer bias at the start, 1 sigma", {1e-6, 10});
   table.add("start_angular_rate_sigma_rad_s", c.start_angular_rate_sigma_rad_s, "rad/s",
             "without IMU: error of the start's angular rate, 1 sigma", {1e-6, 10});
+  table.add(
+      "coupling", c.coupling, {{"loose", Coupling::loose}, {"tight", Coupling::tight}},
+      "graph: the window keeps a measurement's normal equations, or its contours to linearise them anew");
   table.group("window", c.window);
   table.group("particle", c.particle);
   table.group("calibration", c.calibration);
+  table.group("slow", c.slow);
+}
+
+void describe(ConfigTable& table, SlowErrorsConfig& c) {
+  table.add("gravity", c.gravity, "estimate the direction of gravity in the map (ekf)");
+  table.add("gravity_sigma_rad", c.gravity_sigma_rad, "rad", "tilt of the map, 1 sigma about each axis",
+            {1e-6, 1});
+  table.add("pose_offset", c.pose_offset, "estimate an error of the measured pose that lasts (ekf)");
+  table.add("offset_position_sigma_m", c.offset_position_sigma_m, "m", "its size, 1 sigma", {0, 1});
+  table.add("offset_rotation_sigma_rad", c.offset_rotation_sigma_rad, "rad", "its size, 1 sigma", {0, 1});
+  table.add("offset_s", c.offset_s, "s", "its correlation time", {1e-3, 1000});
 }
 
 void describe(ConfigTable& table, CalibrationConfig& c) {
   table.add("time_offset", c.time_offset, "estimate the time offset of the IMU against the camera (ekf)");
   table.add("rotation", c.rotation, "estimate the rotation of the camera in the body (ekf)");
+  table.add("translation", c.translation, "estimate the place of the camera in the body (ekf)");
+  table.add("start_translation_sigma_m", c.start_translation_sigma_m, "m",
+            "error of the given place, 1 sigma", {1e-6, 1});
   table.add("start_time_sigma_s", c.start_time_sigma_s, "s", "error of the given time offset, 1 sigma",
             {1e-6, 1});
   table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad",
@@ -62,9 +79,9 @@ std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& co
   const Motion motion(model, config, noise);
   switch (config.kind) {
     case BackEndKind::ekf:
-      return std::make_unique<Ekf>(motion, config.calibration, T_body_cam);
+      return std::make_unique<Ekf>(motion, config.calibration, config.slow, T_body_cam);
     case BackEndKind::graph:
-      return std::make_unique<Graph>(motion, config.window);
+      return std::make_unique<Graph>(motion, config.window, config.coupling);
     case BackEndKind::particle:
       return std::make_unique<ParticleFilter>(motion, config.particle);
   }

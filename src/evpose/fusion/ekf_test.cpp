@@ -52,7 +52,7 @@ TEST(Ekf, CovarianceGrowsAsDifferencesOfTheStrapdownSay) {
   Ekf ekf(Motion(MotionModel::imu, config, silent));
   ekf.start(0, some_state(), {0, 0, 0});
   const Matrix15d P = ekf.state().covariance;
-  ekf.predict(a, b, false);
+  ekf.predict(a, b, ImuTrust::good);
   const Matrix15d expected = F * P * F.transpose();
   const Matrix15d got = ekf.state().covariance;
   const Vector15d sigma = expected.diagonal().cwiseSqrt();
@@ -74,7 +74,7 @@ TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
   const TimeNs dt = kNsPerMs;
   NavState truth = some_state();
   for (int k = 0; k < steps; ++k) {
-    ekf.predict(sample(k * dt), sample((k + 1) * dt), false);
+    ekf.predict(sample(k * dt), sample((k + 1) * dt), ImuTrust::good);
     truth = strapdown(truth, sample(k * dt), sample((k + 1) * dt), {0, 0, 0}, {0, 0, 0}, kGravity);
   }
   std::mt19937 random(5);
@@ -119,7 +119,7 @@ PoseInformation full_measurement(const Vector6d& offset) {
 TEST(Ekf, UpdateIsTheTextbookKalmanUpdate) {
   Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}));
   ekf.start(0, some_state(), {0, 0, 0});
-  for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), false);
+  for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), ImuTrust::good);
   const FusionState before = ekf.state();
   Vector6d z;
   z << 1e-3, -2e-3, 5e-4, 1e-5, 2e-5, -1e-5;

@@ -34,9 +34,11 @@ Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
     gyro_sigma = c.start_angular_rate_sigma_rad_s;
     accel_sigma = 0;
   }
-  blind_noise_ = noise_;
-  blind_noise_.accel_density = std::max(noise_.accel_density, c.cv_accel_density);
-  blind_noise_.gyro_density = std::max(noise_.gyro_density, c.blind_gyro_density);
+  suspect_noise_ = noise_;
+  suspect_noise_.accel_density = std::max(noise_.accel_density, c.cv_accel_density);
+  suspect_noise_.gyro_density = std::max(noise_.gyro_density, c.blind_gyro_density);
+  blind_noise_ = suspect_noise_;
+  blind_noise_.gyro_walk = std::max(noise_.gyro_walk, c.cv_angular_density);
   start_sigma_.segment<3>(kP).setConstant(c.start_position_sigma_m);
   start_sigma_.segment<3>(kPhi).setConstant(c.start_rotation_sigma_rad);
   start_sigma_.segment<3>(kV).setConstant(c.start_velocity_sigma_m_s);
@@ -44,8 +46,8 @@ Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
   start_sigma_.segment<3>(kBa).setConstant(accel_sigma);
 }
 
-ImuNoise Motion::noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, bool suspect) const {
-  ImuNoise out = noise(suspect);
+ImuNoise Motion::noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, ImuTrust trust) const {
+  ImuNoise out = noise(trust);
   if (model_ != MotionModel::imu) return out;
   // As white noise of the strength that an error which lasts so long has at low frequencies.
   const double factor = scale_sigma_ * std::sqrt(2 * scale_s_);
@@ -65,7 +67,7 @@ FusionState Motion::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& 
 }
 
 void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-                    const Eigen::Vector3d& force, double dt, bool suspect, Matrix15d* transition) const {
+                    const Eigen::Vector3d& force, double dt, ImuTrust trust, Matrix15d* transition) const {
   const Eigen::Quaterniond q_mid = before.T_map_body.q * so3::exp(0.5 * dt * rate);
   const Eigen::Matrix3d R = q_mid.toRotationMatrix();
   // The attitude error is in the body of the step's start; seen from its middle it has turned half the way.
@@ -83,13 +85,12 @@ void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vec
     F.block<3, 3>(kP, kBa) = -0.5 * dt * dt * R;
   }
 
-  const Matrix15d P =
-      F * state.covariance * F.transpose() + process_noise(noise_at(rate, force, suspect), dt);
+  const Matrix15d P = F * state.covariance * F.transpose() + process_noise(noise_at(rate, force, trust), dt);
   state.covariance = 0.5 * (P + P.transpose());
   if (transition != nullptr) *transition = F;
 }
 
-void Motion::step(FusionState& state, const ImuSample& a, const ImuSample& b, bool suspect,
+void Motion::step(FusionState& state, const ImuSample& a, const ImuSample& b, ImuTrust trust,
                   Matrix15d* transition) const {
   if (transition != nullptr) transition->setIdentity();
   EVPOSE_CHECK(model_ == MotionModel::imu && a.t == state.t && b.t >= a.t);
@@ -98,7 +99,7 @@ void Motion::step(FusionState& state, const ImuSample& a, const ImuSample& b, bo
   state.nav = strapdown(before, a, b, state.gyro_bias, state.accel_bias, gravity_map_);
   state.t = b.t;
   spread(state, before, 0.5 * (a.gyro + b.gyro) - state.gyro_bias,
-         0.5 * (a.accel + b.accel) - state.accel_bias, to_seconds(b.t - a.t), suspect, transition);
+         0.5 * (a.accel + b.accel) - state.accel_bias, to_seconds(b.t - a.t), trust, transition);
   state.angular_rate = b.gyro - state.gyro_bias;
 }
 
@@ -112,7 +113,7 @@ void Motion::step(FusionState& state, TimeNs t, Matrix15d* transition) const {
   state.nav.T_map_body.q = (before.T_map_body.q * so3::exp(dt * state.angular_rate)).normalized();
   state.nav.T_map_body.p += dt * before.velocity;
   state.t = t;
-  spread(state, before, state.angular_rate, Eigen::Vector3d::Zero(), dt, false, transition);
+  spread(state, before, state.angular_rate, Eigen::Vector3d::Zero(), dt, ImuTrust::good, transition);
 }
 
 }  // namespace evpose

@@ -37,7 +37,7 @@ void ParticleFilter::draw() {
   covariance.llt().matrixL().solveInPlace(sample_);
 }
 
-void ParticleFilter::update(const PoseInformation& m) {
+void ParticleFilter::update(const PoseInformation& m, std::span<const ContourOffset>) {
   draw();
   const Matrix6d P = state_.pose_covariance();
   const Vector6d sigma = P.diagonal().cwiseMax(1e-30).cwiseSqrt();

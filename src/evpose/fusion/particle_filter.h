@@ -20,11 +20,12 @@ class ParticleFilter : public BackEnd {
 
   using BackEnd::start;
   void start(const FusionState& first) override;
-  void predict(const ImuSample& a, const ImuSample& b, bool suspect) override {
-    motion().step(state_, a, b, suspect);
+  void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override {
+    motion().step(state_, a, b, trust);
   }
   void predict(TimeNs t) override { motion().step(state_, t); }
-  void update(const PoseInformation& measurement) override;
+  using BackEnd::update;
+  void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
   const FusionState& state() const override { return state_; }
 
  private:

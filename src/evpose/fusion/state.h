@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 #include "evpose/imu/strapdown.h"
 
@@ -42,6 +43,22 @@ struct PoseInformation {
   Matrix6d information = Matrix6d::Zero();
   Vector6d vector = Vector6d::Zero();
 };
+
+/// The same measurement relative to another pose near by.
+PoseInformation moved(const PoseInformation& measurement, const Pose& measured_at, const Pose& to);
+
+/// One contour sample's part of a measurement. Its information, and that of all others of one measurement,
+/// is what PoseInformation sums up where it was measured.
+struct ContourOffset {
+  Eigen::Vector3d point_body;   ///< of the sample, from the pose at which it was measured, m
+  Eigen::Vector3d across_body;  ///< distance across the contour in the image by the point, px/m
+  double offset_px = 0;         ///< by which the point should move against `across_body`
+  double weight = 0;            ///< px^-2
+};
+
+/// The sum over the contours, made anew at another pose: the points turn and shift with it exactly, their
+/// projection is that of where they were measured.
+PoseInformation linearised(std::span<const ContourOffset> contours, const Pose& measured_at, const Pose& at);
 
 /// Normalised innovation squared of a measurement relative to a predicted pose of this covariance, divided by
 /// its rank: about 1 when both know how good they are.

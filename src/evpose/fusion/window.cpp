@@ -32,16 +32,16 @@ Matrix15d information_of(Matrix15d covariance) {
 
 void Window::start(const FusionState& first) {
   nodes_.clear();
-  nodes_.push_back({first, Preintegration(first.gyro_bias, first.accel_bias), {}, first.nav.T_map_body});
+  nodes_.push_back({first, Preintegration(first.gyro_bias, first.accel_bias), {}, first.nav.T_map_body, {}});
   prior_at_ = first;
   prior_information_ = information_of(first.covariance);
   prior_vector_.setZero();
 }
 
 void Window::add(const Preintegration& motion, const FusionState& state, const PoseInformation& measurement,
-                 const Pose& measured_at) {
+                 const Pose& measured_at, std::span<const ContourOffset> contours) {
   EVPOSE_CHECK(!nodes_.empty());
-  nodes_.push_back({state, motion, measurement, measured_at});
+  nodes_.push_back({state, motion, measurement, measured_at, {contours.begin(), contours.end()}});
 }
 
 void Window::linearise(std::size_t count, bool newest_measured) {
@@ -56,12 +56,11 @@ void Window::linearise(std::size_t count, bool newest_measured) {
   for (std::size_t i = 0; i < count; ++i) {
     const Node& node = nodes_[i];
     if (newest_measured || i + 1 < count) {
-      const Vector6d d = node.state.nav.T_map_body.minus(node.measured_at);
-      Matrix6d J = Matrix6d::Identity();
-      J.block<3, 3>(3, 3) = so3::right_jacobian_inverse(d.tail<3>());
-      const Matrix6d& H = node.measurement.information;
-      chain_.diagonal(i).topLeftCorner<6, 6>() += J.transpose() * H * J;
-      chain_.vector(i).head<6>() += J.transpose() * (node.measurement.vector - H * d);
+      const Pose& at = node.state.nav.T_map_body;
+      const PoseInformation m = node.contours.empty() ? moved(node.measurement, node.measured_at, at)
+                                                      : linearised(node.contours, node.measured_at, at);
+      chain_.diagonal(i).topLeftCorner<6, 6>() += m.information;
+      chain_.vector(i).head<6>() += m.vector;
     }
     if (i == 0) continue;
     const Preintegration::Residual r = node.motion.residual(nodes_[i - 1].state, node.state, gravity_map_);

@@ -41,7 +41,7 @@ bool bridge(std::deque<CheckedImu>& imu, TimeNs t, const FusionState& state,
   else
     held = *(next - 1);
   held.sample.t = t;
-  held.suspect = true;
+  held.missing = true;
   imu.insert(next, held);
   return true;
 }
@@ -67,6 +67,7 @@ void describe(ConfigTable& table, TrackerConfig& c) {
   table.group("exponential", c.exponential);
   table.group("fusion", c.fusion);
   table.group("imu", c.imu);
+  table.group("agreement", c.agreement);
   table.group("capture", c.capture);
   table.group("health", c.health);
 }
@@ -103,7 +104,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
                fusion_->motion().gravity_map()),
       health_(config.health),
       imu_watch_(config.imu),
-      given_q_body_cam_(setup.T_body_cam.q),
+      agreement_(config.agreement),
+      given_T_body_cam_(setup.T_body_cam),
       start_t_(start.t),
       last_update_(start.t),
       pieces_(cut_contours(*setup_.map)),
@@ -190,14 +192,40 @@ void Tracker::events_complete_until(TimeNs t) {
 
 void Tracker::tell_states() {
   while (!to_tell_.empty() && to_tell_.front().sample.t < imu_time(next_update_)) {
-    const auto& [sample, suspect] = to_tell_.front();
-    if (update_number_ > 0 && sample.t > ahead_.t) {
-      fusion_->motion().step(ahead_, told_, sample, suspect);
-      told_ = sample;
+    const CheckedImu& next = to_tell_.front();
+    if (update_number_ > 0 && next.sample.t > ahead_.t) {
+      fusion_->motion().step(ahead_, told_, next.sample, trust_in(next, next, ahead_.t));
+      told_ = next.sample;
       state_callback_(ahead_);
     }
     to_tell_.pop_front();
   }
+}
+
+/// Whether the IMU is silent up to this time. While it is, the bias stands for the rate that the held reading
+/// does not know; when it is back, it is what it was.
+bool Tracker::bridge_silence(TimeNs until) {
+  if (setup_.motion != MotionModel::imu) return false;
+  const bool blind = bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
+  if (blind && !blind_) before_blind_ = fusion_->state();
+  if (!blind && blind_) {
+    FusionState state = fusion_->state();
+    state.gyro_bias = before_blind_.gyro_bias;
+    state.accel_bias = before_blind_.accel_bias;
+    state.covariance.rightCols<6>().setZero();
+    state.covariance.bottomRows<6>().setZero();
+    state.covariance.bottomRightCorner<6, 6>() = before_blind_.covariance.bottomRightCorner<6, 6>();
+    fusion_->start(state);
+    if (imu_.size() >= 2 && imu_[0].missing) {
+      imu_[0] = {{imu_[0].sample.t, imu_[1].sample.gyro, imu_[1].sample.accel}, true, imu_[1].doubted, false};
+    }
+  }
+  return blind_ = blind;
+}
+
+ImuTrust Tracker::trust_in(const CheckedImu& a, const CheckedImu& b, TimeNs t) const {
+  if (a.missing || b.missing || agreement_.distrusted(t)) return ImuTrust::none;
+  return a.suspect || b.suspect || a.doubted || b.doubted ? ImuTrust::suspect : ImuTrust::good;
 }
 
 void Tracker::predict(TimeNs t) {
@@ -218,17 +246,23 @@ void Tracker::predict(TimeNs t) {
   while (imu_.size() >= 2 && imu_[1].sample.t <= from) imu_.pop_front();
   if (imu_.front().sample.t < from)
     imu_.front().sample = interpolate(imu_.front().sample, imu_[1].sample, from);
-  const auto step = [this](const CheckedImu& a, const CheckedImu& b) {
+  const auto step = [this, t](const CheckedImu& a, const CheckedImu& b) {
     const FusionState& state = fusion_->state();
+    const ImuTrust reading = a.missing || b.missing   ? ImuTrust::none
+                             : a.suspect || b.suspect ? ImuTrust::suspect
+                                                      : ImuTrust::good;
+    agreement_.turn(a.sample, b.sample, state.gyro_bias,
+                    fusion_->motion().noise_at(b.sample.gyro, b.sample.accel, reading).gyro_density);
     if (capture_.searching() || verify_until_ != 0)
       moved_ = joined(moved_, integrate(a.sample, b.sample, state.gyro_bias, state.accel_bias));
-    fusion_->predict(a.sample, b.sample, a.suspect || b.suspect);
+    fusion_->predict(a.sample, b.sample, trust_in(a, b, t));
   };
   while (imu_[1].sample.t < t) {
     step(imu_[0], imu_[1]);
     imu_.pop_front();
   }
-  const CheckedImu last{interpolate(imu_[0].sample, imu_[1].sample, t), imu_[1].suspect};
+  const CheckedImu last{interpolate(imu_[0].sample, imu_[1].sample, t), imu_[1].suspect, imu_[1].doubted,
+                        imu_[1].missing};
   step(imu_[0], last);
   imu_.front() = last;
 }
@@ -274,6 +308,7 @@ void Tracker::search(TimeNs t) {
   widen(error_state::kV, config_.capture.found_velocity_sigma_m_s);
   fusion_->start(state);
   alignment_.forget();
+  agreement_.forget();
   verify_until_ = t + from_seconds(config_.capture.verify_s);
 }
 
@@ -312,6 +347,14 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
     const EventAlignmentResult r = alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_,
                                                      covariance, verdict_callback_ ? &verdicts_ : nullptr});
     if (verdict_callback_) verdict_callback_(front_.kept(), verdicts_);
+    contours_.clear();
+    if (fusion_->takes_contours())
+      for (const SampleOffset& offset : alignment_.offsets()) {
+        const ContourSample& s = samples_[offset.sample];
+        contours_.push_back({predicted.inverse() * setup_.map->position(s.point),
+                             predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()),
+                             offset.offset_px, offset.weight});
+      }
     return {{r.information, r.vector},
             static_cast<int>(samples_.size()),
             r.matched_samples,
@@ -344,9 +387,10 @@ Update Tracker::update(TimeNs t) {
   const double span_s = to_seconds(t - last_update_);
   last_update_ = t;
   const double t0 = now();
-  const TimeNs until = std::max(imu_time(t), fusion_->state().t);
-  const bool blind = setup_.motion == MotionModel::imu &&
-                     bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
+  // When the time offset found has fallen by more than an update, this update's time is past.
+  const bool past = imu_time(t) < fusion_->state().t;
+  const TimeNs until = past ? fusion_->state().t : imu_time(t);
+  const bool blind = bridge_silence(until);
   predict(until);
   if (capture_.searching())
     search(t);
@@ -369,15 +413,21 @@ Update Tracker::update(TimeNs t) {
   const bool watched = verify_until_ != 0,
              refuted = watched && t >= verify_until_ && stpe.slope < config_.capture.least_slope;
   evidence.searching = searching || t < verify_until_ || refuted;
-  evidence.refused = searching || refuted ? "searching for the pose" : refusal(stpe, out.innovation);
+  evidence.refused = searching || refuted ? "searching for the pose"
+                     : past               ? "the time offset has changed"
+                                          : refusal(stpe, out.innovation);
   evidence.accepted = evidence.refused.empty();
   evidence.fault = blind ? "no IMU samples" : imu_watch_.fault(t);
   if (evidence.fault.empty() &&
       2 * (front_.counts().shed - counted_.shed) > front_.counts().read - counted_.read)
     evidence.fault = "more events than are taken (events.most_mev_s)";
   if (evidence.fault.empty() && !stpe.captured) evidence.fault = "events do not gather at the contours";
-  if (evidence.accepted) fusion_->update(stpe.measurement);  // eq. (5) for the newest state
-  setup_.T_body_cam.q = fusion_->calibration().turn * given_q_body_cam_;
+  if (evidence.accepted) fusion_->update(stpe.measurement, contours_);  // eq. (5) for the newest state
+  const Calibration found = fusion_->calibration();
+  setup_.T_body_cam = {found.turn * given_T_body_cam_.q, given_T_body_cam_.p + found.shift};
+
+  if (setup_.motion == MotionModel::imu && !searching) agreement_.judge(fusion_->state());
+  if (evidence.fault.empty() && agreement_.distrusted(t)) evidence.fault = "IMU contradicts the camera";
 
   const Matrix6d covariance = fusion_->state().pose_covariance();
   evidence.sigma_px = sigma_px();

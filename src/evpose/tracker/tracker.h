@@ -19,6 +19,7 @@
 #include "evpose/tracker/capture.h"
 #include "evpose/tracker/contour_view.h"
 #include "evpose/tracker/health.h"
+#include "evpose/tracker/imu_agreement.h"
 #include "evpose/tracker/imu_watch.h"
 #include "evpose/tracker/update.h"
 
@@ -34,6 +35,7 @@ struct TrackerConfig {
   RegistrationConfig exponential;  ///< of field == exponential
   FusionConfig fusion;
   ImuWatchConfig imu;
+  ImuAgreementConfig agreement;
   CaptureConfig capture;
   HealthConfig health;
 };
@@ -117,6 +119,8 @@ class Tracker {
   TimeNs imu_time(TimeNs t) const;  ///< of an instant of the camera's clock
   bool imu_reaches(TimeNs t) const;
   void tell_states();
+  bool bridge_silence(TimeNs until);
+  ImuTrust trust_in(const CheckedImu& a, const CheckedImu& b, TimeNs t) const;
   void predict(TimeNs t);
   double sigma_px() const;
   std::string weakest_direction() const;
@@ -152,11 +156,12 @@ class Tracker {
   VerdictCallback verdict_callback_;
   std::vector<EventVerdict> verdicts_;
   ImuWatch imu_watch_;
+  ImuAgreement agreement_;
   FusionState ahead_;  ///< the state at the last sample told
   ImuSample told_;     ///< that sample; its time is ahead_'s
   std::deque<CheckedImu> to_tell_;
 
-  Eigen::Quaterniond given_q_body_cam_;
+  Pose given_T_body_cam_;
   TimeNs start_t_, last_update_;
   std::int64_t update_number_ = 0, update_stride_ = 1;
   TimeNs next_update_ = 0;
@@ -165,12 +170,14 @@ class Tracker {
   std::size_t waiting_from_ = 0;     ///< consumed part of the first
   ContourPieces pieces_;
   EventAlignment alignment_;
-  std::vector<AlignmentPoint> points_;  ///< of the exponential field
-  std::vector<ContourSample> samples_;  ///< of the events' alignment
-  std::vector<double> flows_, depths_;  ///< of the points, px/s and m
+  std::vector<AlignmentPoint> points_;   ///< of the exponential field
+  std::vector<ContourSample> samples_;   ///< of the events' alignment
+  std::vector<ContourOffset> contours_;  ///< of the last alignment, for a back end that takes them
+  std::vector<double> flows_, depths_;   ///< of the points, px/s and m
   double typical_depth_m_ = 3;
   ImuIncrement moved_;  ///< over the last prediction, while the pose is searched
-  FusionState before_search_;
+  FusionState before_search_, before_blind_;
+  bool blind_ = false;       ///< the IMU is silent
   TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
   double astray_s_ = 0;      ///< for how long it has been lost, or its events have not gathered at contours
   EventFront::Counts counted_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Shared recordings with a spoilt calibration: does the tracker find what was done to them?
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -14,21 +15,25 @@ namespace {
 
 struct CalibrationRequest {
   std::string folder = "../shared/data/peer";
-  std::vector<std::string> assignments;
+  std::vector<std::string> only, assignments;
 };
 
 struct Spoilt {
   double offset_s;
   Eigen::Vector3d turn_deg;  ///< of the given camera about the body's axes
+  Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();
 };
 
-const Spoilt kSpoilt[] = {{0, {0, 0, 0}}, {0.02, {0, 0, 0}}, {-0.02, {0, 0, 0}},      {0, {1, 0, 0}},
-                          {0, {0, 1, 0}}, {0, {0, 0, 1}},    {0.01, {0.5, -0.5, 0.5}}};
+const Spoilt kSpoilt[] = {
+    {0, {0, 0, 0}}, {0.02, {0, 0, 0}}, {-0.02, {0, 0, 0}},       {0, {1, 0, 0}},
+    {0, {0, 1, 0}}, {0, {0, 0, 1}},    {0.01, {0.5, -0.5, 0.5}}, {0, {0, 0, 0}, {10, -10, 5}}};
 
 Status run_one(const PeerRecording& peer, Streams streams, const Spoilt& spoilt) {
   const bool turned = spoilt.turn_deg.norm() > 0;
   CalibrationConfig& calibration = streams.job.config.tracker.fusion.calibration;
-  calibration.time_offset = spoilt.offset_s != 0 || !turned;
+  const bool shifted = spoilt.shift_mm.norm() > 0;
+  calibration.time_offset = spoilt.offset_s != 0 || !(turned || shifted);
+  calibration.translation = shifted;
   calibration.rotation = turned;
   for (ImuSample& s : streams.imu) s.t += from_seconds(spoilt.offset_s);
   // The given rotation is turned back, so that the true one is turn * given.
@@ -40,6 +45,11 @@ Status run_one(const PeerRecording& peer, Streams streams, const Spoilt& spoilt)
     // The start is where the camera was seen to be; the body's attitude is as wrong as the calibration.
     streams.job.start.T_map_body = T_map_cam * streams.job.setup.T_body_cam.inverse();
     streams.job.config.tracker.fusion.start_rotation_sigma_rad = calibration.start_rotation_sigma_rad;
+  }
+  if (shifted) {
+    streams.job.setup.T_body_cam.p -= 1e-3 * spoilt.shift_mm;
+    streams.job.start.T_map_body = T_map_cam * streams.job.setup.T_body_cam.inverse();
+    streams.job.config.tracker.fusion.start_position_sigma_m = 0.01;
   }
   auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start);
   if (!tracker) return tracker.error();
@@ -53,8 +63,9 @@ Status run_one(const PeerRecording& peer, Streams streams, const Spoilt& spoilt)
   feed(streams.packets, streams.imu, **tracker);
   const Calibration found = (*tracker)->calibration();
   const double degrees = 180 / M_PI;
-  std::printf("| %s | %.0f | %.1f, %.1f, %.1f | %s | ", peer.name.c_str(), 1e3 * spoilt.offset_s,
-              spoilt.turn_deg.x(), spoilt.turn_deg.y(), spoilt.turn_deg.z(), to_string(at_end));
+  std::printf("| %s | %.0f | %.1f, %.1f, %.1f | %.0f, %.0f, %.0f | %s | ", peer.name.c_str(),
+              1e3 * spoilt.offset_s, spoilt.turn_deg.x(), spoilt.turn_deg.y(), spoilt.turn_deg.z(),
+              spoilt.shift_mm.x(), spoilt.shift_mm.y(), spoilt.shift_mm.z(), to_string(at_end));
   if (calibration.time_offset)
     std::printf("%.3f +- %.3f | ", 1e3 * (found.time_offset_s - spoilt.offset_s), 1e3 * found.time_sigma_s);
   else
@@ -62,6 +73,11 @@ Status run_one(const PeerRecording& peer, Streams streams, const Spoilt& spoilt)
   if (calibration.rotation)
     std::printf("%.3f +- %.3f | ", degrees * so3::log(found.turn * so3::exp(turn).conjugate()).norm(),
                 degrees * found.turn_sigma_rad.norm());
+  else
+    std::printf("- | ");
+  if (calibration.translation)
+    std::printf("%.1f +- %.1f | ", (1e3 * found.shift - spoilt.shift_mm).norm(),
+                1e3 * found.shift_sigma_m.norm());
   else
     std::printf("- | ");
   std::printf("%.0f |\n", 100.0 * frozen / std::max(1, updates));
@@ -78,10 +94,14 @@ int bench_calibration(const CalibrationRequest& request) {
   std::printf(
       "Made by `evpose bench calibration`; do not edit.\n\n| recording | offset given wrong by ms | rotation "
       "given wrong "
-      "by deg | at the end | offset error ms | rotation error deg | frozen %% of the time "
-      "|\n|---|---|---|---|---|---|---|\n");
+      "by deg | shifted by mm | at the end | offset error ms | rotation error deg | shift error mm | frozen "
+      "%% of "
+      "the time |\n|---|---|---|---|---|---|---|---|---|\n");
   for (const PeerRecording& peer : peer_recordings(request.folder)) {
-    if (peer.name == "room_720p") continue;
+    if (request.only.empty()
+            ? peer.name == "room_720p"  // one second long
+            : std::find(request.only.begin(), request.only.end(), peer.name) == request.only.end())
+      continue;
     TrackRequest track;
     track.recording = peer.folder;
     track.map = peer.map;
@@ -102,6 +122,7 @@ void add_bench_calibration(CLI::App& bench, std::function<int()>& run) {
   auto request = std::make_shared<CalibrationRequest>();
   command->add_option("folder", request->folder, "folder with the recordings and maps")
       ->capture_default_str();
+  command->add_option("--only", request->only, "names of recordings")->delimiter(',');
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command->callback([=, &run] { run = [=] { return bench_calibration(*request); }; });
 }

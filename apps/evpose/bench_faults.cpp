@@ -56,6 +56,8 @@ struct FaultsRequest {
   std::string folder = "../shared/data/peer";
   int replays = 200, threads = 2;
   unsigned seed = 1;
+  std::string only;
+  bool each = false;
   std::vector<std::string> assignments;
 };
 
@@ -68,7 +70,9 @@ struct Replay {
 struct Outcome {
   bool nan = false;
   int updates = 0;
-  int silent = 0;           ///< updates with an error beyond 5 sigma while called tracking
+  int silent = 0;                             ///< updates with an error beyond 5 sigma while called tracking
+  double silent_from_s = 0, silent_to_s = 0;  ///< first and last of these, since the fault's begin
+  double worst = 0, worst_mm = 0;             ///< of these: error in sigma, and its length
   bool named = false;       ///< degraded or lost, with a reason, between fault and 0.15 s after it
   bool lost = false;        ///< the pose left what is of use
   double flag_delay_s = 0;  ///< from there to degraded or lost; < 0: never
@@ -167,7 +171,13 @@ Outcome replay(const Streams& streams, const Replay& what) {
       return;
     }
     const double worst = e.cwiseAbs().cwiseQuotient(u.covariance.diagonal().cwiseSqrt()).maxCoeff();
-    if (u.health == Health::tracking && worst > kWrongSigma) ++out.silent;
+    if (u.health == Health::tracking && worst > kWrongSigma) {
+      const double since_s = to_seconds(u.t - from);
+      if (out.silent++ == 0) out.silent_from_s = since_s;
+      out.silent_to_s = since_s;
+      out.worst = std::max(out.worst, worst);
+      out.worst_mm = std::max(out.worst_mm, 1e3 * e.head<3>().norm());
+    }
     const bool warned = u.health == Health::degraded || u.health == Health::lost;
     if (warned && u.t >= from && u.t < to + 150 * kNsPerMs) {
       if (!out.named) out.first_reason = u.reason;
@@ -205,16 +215,29 @@ int bench_faults(const FaultsRequest& request) {
     streams.push_back(std::move(*loaded));
   }
   std::vector<Replay> replays;
-  for (int i = 0; i < request.replays; ++i)
-    replays.push_back({static_cast<Fault>(i % static_cast<int>(kNames.size())),
+  for (int i = 0; i < request.replays; ++i) {
+    const auto fault = static_cast<std::size_t>(i) % kNames.size();
+    if (!request.only.empty() && request.only != kNames[fault]) continue;
+    replays.push_back({static_cast<Fault>(fault),
                        static_cast<std::size_t>(i) / kNames.size() % streams.size(),
                        request.seed * 100'000 + static_cast<unsigned>(i)});
+  }
   std::vector<Outcome> outcomes(replays.size());
   ThreadPool pool(request.threads);
   pool.for_chunks(replays.size(), 1, [&](std::size_t, std::size_t i, std::size_t) {
     outcomes[i] = replay(streams[replays[i].recording], replays[i]);
   });
 
+  if (request.each)
+    for (std::size_t i = 0; i < replays.size(); ++i) {
+      const Outcome& o = outcomes[i];
+      std::printf(
+          "%zu %s on recording %zu: %d of %d silent, %.3f to %.3f s after the fault began, up to %.1f sigma, "
+          "%.1f mm; named %d (%s); of no use %d, told after %.3f s; %.1f mm at the end\n",
+          i, kNames[static_cast<std::size_t>(replays[i].fault)], replays[i].recording, o.silent, o.updates,
+          o.silent_from_s, o.silent_to_s, o.worst, o.worst_mm, o.named ? 1 : 0, o.first_reason.c_str(),
+          o.lost ? 1 : 0, o.flag_delay_s, o.end_error_mm);
+    }
   std::printf("Made by `evpose bench faults`; do not edit.\n\n%d replays of %.1f s, seed %u.\n\n",
               request.replays, kStretch_s, request.seed);
   std::printf(
@@ -274,6 +297,8 @@ void add_bench_faults(CLI::App& bench, std::function<int()>& run) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   command->add_option("--seed", request->seed, "of all random numbers")->capture_default_str();
+  command->add_option("--only", request->only, "only the replays with this fault");
+  command->add_flag("--each", request->each, "a line for each replay");
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command->callback([=, &run] { run = [=] { return bench_faults(*request); }; });
 }

@@ -197,6 +197,13 @@ class InfoTest(unittest.TestCase):
             self.assertAlmostEqual(flight["duration_s"], 30, delta=0.05)
             self.assertEqual(flight["at_rest_s"], 0, "never at rest")
             self.assertEqual(flight["up"], "-z", "the IMU's z points down")
+        for name, count, speed in (("euroc_v1_02_medium", None, 2.0), ("blackbird_clover_5mps_a", 3000, 5.0),
+                                   ("blackbird_clover_5mps_b", 3000, 5.0)):
+            told = info(self.shared(f"data/real/drone_imu_mocap/{name}"))
+            self.assertAlmostEqual(told["ground truth"]["largest_speed_m_s"], speed, delta=0.3, msg=name)
+            if count:
+                self.assertEqual(told["ground truth"]["count"], count)
+                self.assertAlmostEqual(told["ground truth"]["rate_hz"], 100, delta=0.1)
 
     def test_calibrations(self):
         for path in sorted(self.shared("data/real/formats/calibrations").glob("*.[yj]*")):

@@ -21,6 +21,7 @@ namespace {
 
 constexpr std::size_t kSampleRows = 200;
 constexpr std::size_t kMatrixColumns = 12;
+constexpr std::size_t kMostCsvColumns = 17;
 /// No trajectory has a pose a minute: larger steps are microseconds.
 constexpr double kLongestStep = 60;
 const std::string kKittiRow = "a row is the 12 numbers of a 3x4 matrix, row by row";
@@ -29,6 +30,8 @@ const std::string kKittiRow = "a row is the 12 numbers of a 3x4 matrix, row by r
 struct Look {
   std::size_t columns = 0;
   bool commas = false;
+  bool fractions = false;      ///< some stamp is written with a point: they are seconds
+  bool scalar_last = false;    ///< a heading says so: `..., qx, qy, qz, qw`
   std::vector<double> stamps;  ///< first column
 
   double step() const {
@@ -41,6 +44,15 @@ struct Look {
   }
 };
 
+/// Where a heading names a part of the quaternion, such as `qw`, `q_w` or `q_RS_w []`; -1: nowhere.
+int column_of(const std::vector<std::string_view>& heading, char part) {
+  for (std::size_t i = 0; i < heading.size(); ++i) {
+    const std::string_view name = trimmed(heading[i].substr(0, heading[i].find('[')));
+    if (name.size() >= 2 && name.front() == 'q' && name.back() == part) return static_cast<int>(i);
+  }
+  return -1;
+}
+
 Expected<Look> look_at(const std::string& path) {
   auto lines = LineReader::open(path);
   if (!lines) return lines.error();
@@ -52,11 +64,18 @@ Expected<Look> look_at(const std::string& path) {
     if (!more) return more.error();
     if (!*more) break;
     line = trimmed(line);
-    if (line.empty() || line.front() == '#') continue;
+    if (!line.empty() && line.front() == '#') {
+      split_fields(line.substr(1), fields);
+      const int x = column_of(fields, 'x'), w = column_of(fields, 'w');
+      if (x >= 0 && w >= 0) out.scalar_last = x < w;
+      continue;
+    }
+    if (line.empty()) continue;
     split_fields(line, fields);
     double stamp = 0;
     if (!parse_number(fields.front(), stamp)) break;  // told of when it is read
     if (out.columns == 0) out.columns = fields.size();
+    out.fractions = out.fractions || fields.front().find('.') != std::string_view::npos;
     out.commas = out.commas || line.find(',') != std::string_view::npos;
     out.stamps.push_back(stamp);
   }
@@ -138,7 +157,7 @@ Expected<std::vector<TimedPose>> read_euroc(const std::string& path) {
                                .unit = "nanoseconds",
                                .time_decimals = 0,
                                .w_first = true,
-                               .most_columns = 17});
+                               .most_columns = kMostCsvColumns});
 }
 
 Expected<std::vector<TimedPose>> read_kitti(const std::string& path, const std::string& times) {
@@ -178,6 +197,16 @@ Expected<std::vector<TimedPose>> read_trajectory(const std::string& path) {
   const auto look = look_at(path);
   if (!look) return look.error();
   if (look->columns == kMatrixColumns && !look->commas) return read_kitti(path);
+  if (look->commas && look->fractions) {
+    log_detail(path + ": stamps are read as seconds, the quaternion as x, y, z, w");
+    return read_pose_rows(
+        path, {.row = "a row is `t,px,py,pz,qx,qy,qz,qw`, t in s", .most_columns = kMostCsvColumns});
+  }
+  if (look->commas && look->scalar_last)
+    return read_pose_rows(path, {.row = "a row is `t,px,py,pz,qx,qy,qz,qw`, t in ns",
+                                 .unit = "nanoseconds",
+                                 .time_decimals = 0,
+                                 .most_columns = kMostCsvColumns});
   if (look->commas) return read_euroc(path);
   if (look->columns == 8 && look->step() > kLongestStep) {
     log_detail(path + ": stamps are read as microseconds");

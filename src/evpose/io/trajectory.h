@@ -9,10 +9,10 @@
 
 namespace evpose {
 
-/// Reads a trajectory of any kind that it recognises: TUM; EuRoC; the motion capture of TUM-VIE, which is TUM
-/// in microseconds; KITTI, with its times beside it; poses of a bag, those of the first topic that has some.
-/// Poses are as the file has them: bodies and frames differ between data sets. Errors: as for read_tum();
-/// times that are missing or of another number.
+/// Reads a trajectory of any kind that it recognises: TUM; EuRoC; CSV whose stamps are seconds, or whose
+/// heading has qx before qw; TUM in microseconds, as TUM-VIE's motion capture; KITTI, with its times beside
+/// it; poses of a bag, those of the first topic that has some. Poses are as the file has them: bodies and
+/// frames differ between data sets. Errors: as for read_tum(); times that are missing or of another number.
 Expected<std::vector<TimedPose>> read_trajectory(const std::string& path);
 
 /// Rows `timestamp [ns], px, py, pz, qw, qx, qy, qz, ...`, 8 to 17 values; what follows the pose is ignored.

@@ -56,6 +56,26 @@ TEST(Trajectory, EurocTruthOfSeventeenColumnsHasItsScalarFirst) {
   EXPECT_NEAR(read->back().pose.q.x(), -0.8, 1e-15);
 }
 
+TEST(Trajectory, CsvInSecondsOrWithAHeadingThatSaysSoHasItsScalarLast) {
+  const TemporaryFolder folder;
+  const auto seconds =
+      folder.file("a.csv",
+                  "#t[s],px[m],py,pz,qx,qy,qz,qw,vx[m/s]\n"
+                  "1525745865.001655,1,2,3,-0.8,0,0,0.6,9\n1525745865.011655,1,2,3,-0.8,0,0,0.6,9\n");
+  const auto nanoseconds =
+      folder.file("b.csv",
+                  "#timestamp [ns], p_x [m], p_y [m], p_z [m], q_x [], q_y [], q_z [], q_w []\n"
+                  "1525745865001655000,1,2,3,-0.8,0,0,0.6\n1525745865011655000,1,2,3,-0.8,0,0,0.6\n");
+  for (const auto& path : {seconds, nanoseconds}) {
+    const auto read = read_trajectory(path);
+    ASSERT_TRUE(read.ok()) << error_line(read);
+    ASSERT_EQ(read->size(), 2u);
+    EXPECT_EQ(read->back().t, 1'525'745'865'011'655'000);
+    EXPECT_NEAR(read->back().pose.q.w(), 0.6, 1e-15);
+    EXPECT_NEAR(read->back().pose.q.x(), -0.8, 1e-15);
+  }
+}
+
 TEST(Trajectory, TumIsRecognised) {
   const TemporaryFolder folder;
   const auto written = curve(20);

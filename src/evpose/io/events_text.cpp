@@ -14,7 +14,6 @@ namespace evpose {
 namespace {
 
 constexpr std::size_t kSampleLines = 1000;
-constexpr std::size_t kBlockEvents = 16384;
 constexpr std::int64_t kTailBytes = 64 << 10;
 
 /// How the columns of a file are read.
@@ -120,60 +119,76 @@ struct Row4 {
   std::int32_t x = 0, y = 0, p = 0;
 };
 
-/// Reads the common way of writing an event: digits, single separators, no signs. False, where it is written
-/// otherwise: then the general way, four times slower, decides.
-class PlainRow {
+/// Reads lines written the common way: digits, single separators, no signs. Where one is written otherwise
+/// the general way, four times slower, decides. Every line has its end, so that no digit has to be held
+/// against the end of the buffer.
+class PlainRows {
  public:
-  PlainRow(std::string_view line, const Layout& layout)
-      : at_(line.data()), end_(line.data() + line.size()), seconds_(layout.unit == "s") {}
+  PlainRows(std::string_view whole_lines, const Layout& layout)
+      : begin_(whole_lines.data()),
+        at_(begin_),
+        end_(begin_ + whole_lines.size()),
+        time_first_(layout.t == 0),
+        seconds_(layout.unit == "s") {}
 
-  bool read(const Layout& layout, Row4& row) {
-    const bool time_first = layout.t == 0;
-    if (time_first && !(take_time(row.t_us) && take_separator())) return false;
-    if (!take_small(row.x) || !take_separator() || !take_small(row.y) || !take_separator()) return false;
-    if (!take_small(row.p) || row.p > 1) return false;
-    if (!time_first && !(take_separator() && take_time(row.t_us))) return false;
-    return at_ == end_;
+  /// False, and nothing taken, when the next line is none of these or there is none.
+  bool read(Row4& row) {
+    if (at_ == end_) return false;
+    const char* const line = at_;
+    separator_ = 0;
+    if (take_row(row)) return true;
+    at_ = line;
+    return false;
   }
+  std::size_t bytes() const { return static_cast<std::size_t>(at_ - begin_); }
 
  private:
   static constexpr int kMostDigits = 17, kMostOfPixel = 6, kMostOfSeconds = 10, kDecimals = 6;
 
-  /// Up to `most` digits, one at least.
-  bool take_digits(int most, std::int64_t& value) {
+  bool take_row(Row4& row) {
+    if (time_first_ && !(take_time(row.t_us) && take_separator())) return false;
+    if (!take_small(row.x) || !take_separator() || !take_small(row.y) || !take_separator()) return false;
+    if (!take_small(row.p) || row.p > 1) return false;
+    if (!time_first_ && !(take_separator() && take_time(row.t_us))) return false;
+    if (*at_ == '\r') ++at_;
+    return *at_++ == '\n';
+  }
+  static unsigned digit(char c) { return static_cast<unsigned char>(c) - unsigned{'0'}; }
+  /// One to `most` digits.
+  template <class T>
+  bool take_digits(int most, T& value) {
     const char* const begin = at_;
-    value = 0;
-    for (; at_ < end_ && *at_ >= '0' && *at_ <= '9' && at_ - begin <= most; ++at_)
-      value = 10 * value + (*at_ - '0');
+    T sum = 0;
+    for (unsigned d = digit(*at_); d <= 9 && at_ - begin <= most; d = digit(*++at_))
+      sum = 10 * sum + static_cast<T>(d);
+    value = sum;
     return at_ > begin && at_ - begin <= most;
   }
-  bool take_small(std::int32_t& value) {
-    std::int64_t wide = 0;
-    if (!take_digits(kMostOfPixel, wide)) return false;
-    value = static_cast<std::int32_t>(wide);
-    return true;
-  }
+  bool take_small(std::int32_t& value) { return take_digits(kMostOfPixel, value); }
   /// Whatever stands behind the microseconds is rounded down.
   bool take_time(std::int64_t& t_us) {
     if (!seconds_) return take_digits(kMostDigits, t_us);
-    if (!take_digits(kMostOfSeconds, t_us) || at_ == end_ || *at_ != '.') return false;
+    std::int64_t sum = 0;
+    if (!take_digits(kMostOfSeconds, sum) || *at_ != '.') return false;
     ++at_;
     int decimals = 0;
-    for (; at_ < end_ && *at_ >= '0' && *at_ <= '9'; ++at_, ++decimals)
-      if (decimals < kDecimals) t_us = 10 * t_us + (*at_ - '0');
-    for (; decimals < kDecimals; ++decimals) t_us *= 10;
+    for (; decimals < kDecimals && digit(*at_) <= 9; ++at_, ++decimals) sum = 10 * sum + digit(*at_);
+    for (; decimals < kDecimals; ++decimals) sum *= 10;
+    while (digit(*at_) <= 9) ++at_;
+    t_us = sum;
     return true;
   }
   bool take_separator() {
-    if (at_ == end_ || (*at_ != ' ' && *at_ != ',')) return false;
+    if (*at_ != ' ' && *at_ != ',') return false;
     if (separator_ == 0) separator_ = *at_;
     return *at_++ == separator_;
   }
 
+  const char* begin_;
   const char* at_;
   const char* end_;
-  bool seconds_;
-  char separator_ = 0;
+  bool time_first_, seconds_;
+  char separator_ = 0;  ///< of this line
 };
 
 class Source {
@@ -182,31 +197,40 @@ class Source {
       : lines_(std::move(lines)), layout_(std::move(layout)), plain_(layout_.unit != "ns") {}
 
   Expected<bool> fetch(RawEvents& out) {
-    out.t_us.clear(), out.x.clear(), out.y.clear(), out.p.clear(), out.line.clear();
+    resize(out, kBlockEvents);
+    std::size_t count = 0;
     std::string_view line;
-    while (out.size() < kBlockEvents) {
+    while (true) {
+      if (plain_) fetch_plain(out, count);
+      if (count == kBlockEvents) break;
       const auto more = lines_.next(line);
       if (!more) return more.error();
-      if (!*more) return out.size() > 0;
-      Row4 row;
-      if (plain_ && PlainRow(line, layout_).read(layout_, row)) {
-        push(row, out);
-        continue;
-      }
+      if (!*more) break;
       line = trimmed(line);
       if (is_aside(line, lines_.number())) continue;
-      if (auto status = parse(line, out); !status) return status.error();
+      Row4 row;
+      if (auto status = parse(line, row); !status) return status.error();
+      put(row, lines_.number(), count++, out);
     }
-    return true;
+    resize(out, count);
+    return count > 0;
   }
 
  private:
-  Status parse(std::string_view line, RawEvents& out) {
+  void fetch_plain(RawEvents& out, std::size_t& count) {
+    PlainRows rows(lines_.whole_lines(), layout_);
+    const std::size_t before = count;
+    const std::int64_t first_line = lines_.number() + 1;
+    for (Row4 row; count < kBlockEvents && rows.read(row); ++count)
+      put(row, first_line + static_cast<std::int64_t>(count - before), count, out);
+    lines_.skip(rows.bytes(), static_cast<std::int64_t>(count - before));
+  }
+
+  Status parse(std::string_view line, Row4& row) {
     split_fields(line, fields_);
     if (fields_.size() != 4)
       return Error{lines_.where(), text(fields_.size(), " values instead of 4"),
                    "is the line cut off? an event has time, column, row and polarity"};
-    Row4 row;
     if (!parse_time(fields_[layout_.t], layout_.unit, row.t_us))
       return Error{lines_.where(), text("'", fields_[layout_.t], "' is not a time in ", layout_.unit),
                    "correct the line, or set events.time_unit"};
@@ -216,16 +240,19 @@ class Source {
                    "columns and rows are whole numbers"};
     if (!parse_small(fields_[layout_.p], row.p))
       return Error{lines_.where(), text("'", fields_[layout_.p], "' is not a polarity"), "use 0/1 or -1/+1"};
-    push(row, out);
     return {};
   }
 
-  void push(const Row4& row, RawEvents& out) const {
-    out.t_us.push_back(row.t_us);
-    out.x.push_back(row.x);
-    out.y.push_back(row.y);
-    out.p.push_back(row.p);
-    out.line.push_back(lines_.number());
+  static void resize(RawEvents& out, std::size_t count) {
+    out.t_us.resize(count), out.x.resize(count), out.y.resize(count), out.p.resize(count);
+    out.line.resize(count);
+  }
+  static void put(const Row4& row, std::int64_t line, std::size_t i, RawEvents& out) {
+    out.t_us[i] = row.t_us;
+    out.x[i] = row.x;
+    out.y[i] = row.y;
+    out.p[i] = row.p;
+    out.line[i] = line;
   }
 
   LineReader lines_;

@@ -3,6 +3,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -35,7 +36,9 @@ Expected<LineReader> LineReader::open(const std::string& path) {
 }
 
 bool LineReader::refill() {
-  if (buffer_.empty()) buffer_.resize(kBuffer);
+  // A small file, as calibrations are, needs no more room than it has bytes.
+  if (buffer_.empty())
+    buffer_.resize(std::clamp(static_cast<std::size_t>(file_.size) + 1, kLongestLine / 16, kBuffer));
   std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
   end_ -= begin_;
   begin_ = 0;
@@ -67,6 +70,19 @@ Expected<bool> LineReader::next(std::string_view& line) {
   ++number_;
   if (line.ends_with('\r')) line.remove_suffix(1);
   return true;
+}
+
+std::string_view LineReader::whole_lines() {
+  if (begin_ == end_ && !refill()) return {};
+  const std::string_view held(buffer_.data() + begin_, end_ - begin_);
+  return held.substr(0, held.rfind('\n') + 1);
+}
+
+void LineReader::skip(std::size_t bytes, std::int64_t lines) {
+  EVPOSE_CHECK(bytes <= end_ - begin_);
+  begin_ += bytes;
+  offset_ += static_cast<std::int64_t>(bytes);
+  number_ += lines;
 }
 
 }  // namespace evpose

@@ -33,6 +33,12 @@ class LineReader {
   /// file. Errors: a line of more than 64 KiB, which is no text.
   Expected<bool> next(std::string_view& line);
 
+  /// All whole lines that follow and are in memory already, each with its end; empty when there is none, as
+  /// at the end of the file. They are still to be given by next(), unless skip() takes them.
+  std::string_view whole_lines();
+  /// Of whole_lines(), so many bytes, which are so many lines.
+  void skip(std::size_t bytes, std::int64_t lines);
+
   std::int64_t number() const { return number_; }  ///< of the line given last, from 1
   std::int64_t offset() const { return offset_; }  ///< bytes up to the end of the line given last
   std::int64_t size() const { return file_.size; }

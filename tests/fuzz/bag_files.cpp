@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Bags, the messages in them, logs and trajectories.
-#include <unistd.h>
+#include <sqlite3.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
+#include <cstring>
 
 #include "evpose/io/bag_messages.h"
 #include "evpose/io/compression.h"
@@ -18,24 +17,61 @@ namespace {
 
 using namespace evpose;
 
-/// A name in the file system, on which SQLite insists; in memory, where there is such a place.
-std::string make_name() {
-  namespace fs = std::filesystem;
-  std::error_code ignored;
-  const fs::path memory = "/dev/shm";
-  const fs::path folder = fs::is_directory(memory, ignored) ? memory : fs::temp_directory_path();
-  return (folder / ("evpose-fuzz-" + std::to_string(::getpid()) + ".db3")).string();
-}
+/// The input as SQLite opens it: a file system that holds this one file, to be read.
+class OneFile {
+ public:
+  static void hold(fuzz::Bytes bytes) {
+    static const int registered = sqlite3_vfs_register(system(), 1);
+    EVPOSE_CHECK(registered == SQLITE_OK);
+    content_ = bytes;
+  }
 
-const std::string& named_file(fuzz::Bytes bytes) {
-  static const std::string path = make_name();
-  static const int registered = std::atexit([] { std::remove(path.c_str()); });
-  EVPOSE_CHECK(registered == 0);
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  EVPOSE_CHECK(file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size());
-  EVPOSE_CHECK(std::fclose(file) == 0);
-  return path;
-}
+ private:
+  static sqlite3_vfs* system() {
+    static sqlite3_vfs made = *sqlite3_vfs_find(nullptr);
+    made.zName = "one-file";
+    made.szOsFile = sizeof(sqlite3_file);
+    made.mxPathname = 100;
+    made.xOpen = [](sqlite3_vfs*, sqlite3_filename, sqlite3_file* file, int flags, int* out_flags) {
+      file->pMethods = (flags & SQLITE_OPEN_MAIN_DB) != 0 ? methods() : nullptr;
+      if (out_flags != nullptr) *out_flags = flags;
+      return file->pMethods != nullptr ? SQLITE_OK : SQLITE_CANTOPEN;
+    };
+    made.xDelete = [](sqlite3_vfs*, const char*, int) { return SQLITE_IOERR; };
+    made.xAccess = [](sqlite3_vfs*, const char*, int, int* found) { return *found = 0, SQLITE_OK; };
+    made.xFullPathname = [](sqlite3_vfs*, const char* name, int room, char* out) {
+      sqlite3_snprintf(room, out, "%s", name);
+      return SQLITE_OK;
+    };
+    return &made;
+  }
+
+  static const sqlite3_io_methods* methods() {
+    static sqlite3_io_methods made{};
+    made.iVersion = 1;
+    made.xClose = [](sqlite3_file*) { return SQLITE_OK; };
+    made.xRead = [](sqlite3_file*, void* out, int count, sqlite3_int64 at) {
+      const auto size = static_cast<sqlite3_int64>(content_.size());
+      const sqlite3_int64 there = std::clamp<sqlite3_int64>(size - at, 0, count);
+      if (there > 0) std::memcpy(out, content_.data() + at, static_cast<std::size_t>(there));
+      std::memset(static_cast<char*>(out) + there, 0, static_cast<std::size_t>(count - there));
+      return there == count ? SQLITE_OK : SQLITE_IOERR_SHORT_READ;
+    };
+    made.xWrite = [](sqlite3_file*, const void*, int, sqlite3_int64) { return SQLITE_READONLY; };
+    made.xTruncate = [](sqlite3_file*, sqlite3_int64) { return SQLITE_READONLY; };
+    made.xSync = [](sqlite3_file*, int) { return SQLITE_OK; };
+    made.xFileSize = [](sqlite3_file*, sqlite3_int64* size) {
+      return *size = static_cast<sqlite3_int64>(content_.size()), SQLITE_OK;
+    };
+    made.xLock = made.xUnlock = [](sqlite3_file*, int) { return SQLITE_OK; };
+    made.xCheckReservedLock = [](sqlite3_file*, int* held) { return *held = 0, SQLITE_OK; };
+    made.xFileControl = [](sqlite3_file*, int, void*) { return SQLITE_NOTFOUND; };
+    made.xSectorSize = made.xDeviceCharacteristics = [](sqlite3_file*) { return 0; };
+    return &made;
+  }
+
+  static inline fuzz::Bytes content_;
+};
 
 constexpr const char* kTypes[] = {
     "dvs_msgs/EventArray",       "event_camera_msgs/EventPacket",  "sensor_msgs/Imu",  "sensor_msgs/Image",
@@ -63,9 +99,8 @@ EVPOSE_FUZZ_TARGET(mcap) { evpose::fuzz::read_all(bytes, "mcap"); }
 EVPOSE_FUZZ_TARGET(dataflash) { evpose::fuzz::read_all(bytes, "dataflash"); }
 
 EVPOSE_FUZZ_TARGET(rosbag2_sqlite) {
-  const std::string& path = named_file(bytes);
-  evpose::fuzz::read_all_events(path, "rosbag2");
-  evpose::fuzz::read_all_sensors(path, "rosbag2");
+  OneFile::hold(bytes);
+  evpose::fuzz::read_all(bytes, "rosbag2");
 }
 
 /// The first byte chooses the type and the wire.

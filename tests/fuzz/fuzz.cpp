@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fuzz.h"
 
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include "evpose/io/event_formats.h"
 #include "evpose/io/event_reader.h"
 
@@ -32,13 +29,6 @@ const Target* find_target(const std::string& name) {
   for (const Target& target : targets())
     if (target.name == name) return &target;
   return nullptr;
-}
-
-std::string as_file(Bytes bytes) {
-  static const int descriptor = ::memfd_create("evpose-fuzz", MFD_CLOEXEC);
-  EVPOSE_CHECK(descriptor >= 0 && ::ftruncate(descriptor, 0) == 0);
-  EVPOSE_CHECK(::pwrite(descriptor, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
-  return "/proc/self/fd/" + std::to_string(descriptor);
 }
 
 void read_all_events(const std::string& path, const std::string& format) {

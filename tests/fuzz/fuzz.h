@@ -24,9 +24,11 @@ struct Registration {
   explicit Registration(const Target& target) { targets().push_back(target); }
 };
 
-/// The input as a file that is opened by name and lies in memory: readers are tried as they are used. One
-/// file serves all calls.
+/// The name under which stat() and fopen() find these bytes, until the next call: readers are tried as they
+/// are used, by name, but without the cost of a file.
 std::string as_file(Bytes bytes);
+/// The same for libraries that open files by themselves: a real one, in memory where there is such a place.
+std::string as_real_file(Bytes bytes);
 
 /// Reads all events of a file, and holds them to what an EventReader promises. `format` as of open_events().
 void read_all_events(const std::string& path, const std::string& format);

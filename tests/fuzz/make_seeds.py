@@ -9,6 +9,7 @@ import struct
 import sys
 
 import bag_seeds
+import hdf5_seeds
 
 
 def raw(header, words, form):
@@ -279,7 +280,7 @@ SEEDS = {
 def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
-    for target, makers in (SEEDS | bag_seeds.SEEDS).items():
+    for target, makers in (SEEDS | bag_seeds.SEEDS | hdf5_seeds.SEEDS).items():
         folder = pathlib.Path(sys.argv[1]) / target
         folder.mkdir(parents=True, exist_ok=True)
         for number, make in enumerate(makers):

@@ -12,7 +12,12 @@
 namespace evpose {
 
 /// Events in a block are at most this many, so that it stays in the cache between decoder and packer.
+/// Fuzzers, whose inputs are small, meet the borders of blocks by smaller ones.
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
+inline constexpr std::size_t kBlockEvents = 256;
+#else
 inline constexpr std::size_t kBlockEvents = 16384;
+#endif
 
 /// Events as a decoder gives them: the first `count` of `events`, each with the stamp
 /// base_us + dt_us in whole microseconds.

@@ -10,6 +10,7 @@ namespace evpose {
 namespace {
 
 constexpr hssize_t kMostAttributeItems = 4096;
+constexpr std::size_t kLongestText = 1 << 20;  // bytes of all texts of an attribute
 
 Hdf5Handle own(hid_t id, herr_t (*close)(hid_t)) { return {id, close}; }
 
@@ -85,7 +86,8 @@ std::optional<std::vector<std::string>> read_variable_strings(const Hdf5Handle& 
 std::optional<std::vector<std::string>> read_fixed_strings(const Hdf5Handle& attribute, hssize_t items) {
   const auto type = own(H5Aget_type(attribute.get()), H5Tclose);
   const std::size_t width = H5Tget_size(type.get());
-  if (width == 0 || width > (1u << 20)) return std::nullopt;
+  if (width == 0 || width > kLongestText || static_cast<std::size_t>(items) > kLongestText / width)
+    return std::nullopt;
   std::string buffer(width * static_cast<std::size_t>(items), '\0');
   if (items > 0 && H5Aread(attribute.get(), type.get(), buffer.data()) < 0) return std::nullopt;
   std::vector<std::string> out;

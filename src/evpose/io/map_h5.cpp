@@ -77,7 +77,7 @@ class Reader {
       return fail<T>(read.error());
     const auto crc = dataset->attribute_u32("crc32");
     if (!crc) return fail<T>({where, "has no checksum (attribute crc32)", "build the map again"});
-    if (*crc != crc32(values.data(), values.size() * sizeof(T)))
+    if (!crc32_agrees(*crc, crc32(values.data(), values.size() * sizeof(T))))
       return fail<T>({where, "does not match its checksum", kDamaged});
     if constexpr (std::is_floating_point_v<T>) {
       const auto wrong =
@@ -271,10 +271,13 @@ Status read_polygons(const Hdf5File& file, Reader& reader, ContourMap& map) {
   if (!reader.status()) return reader.status();
   const std::string where = file.path() + ": /polygons";
   const auto planes = static_cast<std::int64_t>(map.planes.size());
+  std::uint64_t untaken = vertices.size() / 3;
   for (std::size_t g = 0; g < start.size(); ++g) {
     if (start[g] > vertices.size() / 3 || count[g] > vertices.size() / 3 - start[g])
       return Error{where, text("row ", g, " reaches beyond the ", vertices.size() / 3, " vertices"),
                    kDamaged};
+    if (count[g] > untaken) return Error{where, text("row ", g, " shares vertices with another"), kDamaged};
+    untaken -= count[g];
     if (plane[g] < -1 || plane[g] >= planes)
       return Error{where, text("row ", g, " names plane ", plane[g], " of ", planes), kDamaged};
     if (hole_of[g] < -1 || hole_of[g] >= rows)
@@ -294,7 +297,9 @@ Status check_whole(const Hdf5File& file) {
     return Error{file.path() + ": /meta", "has no checksum", "build the map again"};
   const auto crc = map_checksum(file);
   if (!crc) return crc.error();
-  if (stored->front() != *crc) return Error{file.path() + ": /meta", "does not match its checksum", kDamaged};
+  if (!(stored->front() >= 0 && stored->front() <= UINT32_MAX) ||
+      !crc32_agrees(static_cast<std::uint32_t>(stored->front()), *crc))
+    return Error{file.path() + ": /meta", "does not match its checksum", kDamaged};
   return {};
 }
 

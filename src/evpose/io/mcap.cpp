@@ -191,7 +191,7 @@ Expected<bool> McapReader::read_summary() {
   // The checksum goes on into the footer, up to itself.
   const std::size_t summed = size + kFooterBytes - sizeof(crc);
   if (const auto got = file_.read(summed, room_); !got) return got.error();
-  if (crc != 0 && crc != crc32(room_.data(), summed)) {
+  if (crc != 0 && !crc32_agrees(crc, crc32(room_.data(), summed))) {
     log_warning(file_.path() + ": the file's summary is damaged");
     return false;
   }
@@ -251,7 +251,7 @@ Status McapReader::load_chunk(std::span<const std::byte> content) {
     return damaged(text("a chunk with the unknown compression '", name.substr(0, 20), "'"));
   }
   if (chunk_.size() != size) return damaged("a chunk states a wrong size");
-  if (crc != 0 && crc != crc32(chunk_.data(), chunk_.size()))
+  if (crc != 0 && !crc32_agrees(crc, crc32(chunk_.data(), chunk_.size())))
     return damaged("a chunk's checksum does not fit its data");
   return {};
 }

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Whole files of HDF5, by way of the HDF5 library, which opens them by itself and is not built with
+// sanitizers.
+#include <cmath>
+
+#include "evpose/core/error.h"
+#include "evpose/io/map_h5.h"
+#include "fuzz.h"
+
+/// Columns, DSEC, Metavision, MVSEC.
+EVPOSE_FUZZ_TARGET(hdf5_events) {
+  const std::string path = evpose::fuzz::as_real_file(bytes);
+  evpose::fuzz::read_all_events(path, "h5");
+  evpose::fuzz::read_all_sensors(path, "h5");
+}
+
+EVPOSE_FUZZ_TARGET(hdf5_map) {
+  const std::string path = evpose::fuzz::as_real_file(bytes);
+  if (const auto placed = evpose::read_map_placement(path); placed && placed->origin_llh)
+    EVPOSE_CHECK(placed->origin_llh->allFinite());
+  const auto map = evpose::read_map_h5(path);
+  if (!map) return;
+  for (const auto& point : map->points) {
+    EVPOSE_CHECK(point.position.allFinite() && point.sigma >= 0 && std::isfinite(point.length));
+    EVPOSE_CHECK(point.plane_a >= -1 && point.plane_b >= -1);
+  }
+  for (const auto& triangle : map->occluders.triangles)
+    for (const auto vertex : triangle)
+      EVPOSE_CHECK(static_cast<std::size_t>(vertex) < map->occluders.vertices.size());
+}

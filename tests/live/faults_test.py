@@ -9,33 +9,16 @@ import os
 import pathlib
 import signal
 import socket
-import struct
-import subprocess
-import sys
-import tempfile
 import time
-import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "end_to_end"))
-try:
-    import h5py  # noqa: F401: the recordings need it
-    import numpy as np
-except ImportError as missing:
-    print(f"skipped: {missing}: scripts/packages.sh test")
-    sys.exit(77)
+import numpy as np
+import serving
+from recording import HEIGHT, WIDTH
+from serving import EVENTS, IMU, ServingTest, free_port
 
-from recording import HEIGHT, WIDTH, Recording
-
-EVPOSE = None
 STEP_US = 2000
 STILL = [0.0, 0.0, 0.0, 0.0, 0.0, 9.81]
 PAUSE_S = 0.392  # here the camera nearly stands
-
-
-def free_port(kind):
-    with socket.socket(socket.AF_INET, kind) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 class Driver:
@@ -58,72 +41,37 @@ class Driver:
 
     def packet(self, kind, payload):
         self.sequence += 1
-        return struct.pack("<IB3xIIq", 0x31505645, kind, self.sequence, len(payload), self.clock_us * 1000) + payload
+        return serving.packet(kind, self.sequence, self.clock_us, payload)
 
-    def step(self, rows, samples):
-        data = b""
-        if samples is not None:
-            data += self.packet(2, b"".join(struct.pack("<q6d", t, *sample) for t, sample in samples))
-        if rows is not None:
-            data += self.packet(1, rows.tobytes())
-        self.socket.sendall(data)
+    def step(self, events, samples):
+        """Either may be None: that sensor is silent."""
+        for kind, payload in ((IMU, samples), (EVENTS, events)):
+            if payload is not None:
+                self.socket.sendall(self.packet(kind, payload))
         self.clock_us += STEP_US
         self.sent += 1
         time.sleep(max(0.0, self.begin + self.sent * STEP_US * 1e-6 - time.monotonic()))
 
     def play(self, begin_s, end_s):
         """What the camera sees and the IMU feels from one time of the recording to another."""
-        r = self.recording
-        for at in range(int(begin_s * 1e6), int(end_s * 1e6), STEP_US):
-            chosen = (r.t >= at) & (r.t < at + STEP_US)
-            rows = self.rows(r.t[chosen] - at, r.x[chosen], r.y[chosen], r.p[chosen])
-            imu = (r.imu_t_ns >= at * 1000) & (r.imu_t_ns < (at + STEP_US) * 1000)
-            self.step(rows, [(int(t) + (self.clock_us - at) * 1000, s) for t, s in zip(r.imu_t_ns[imu], r.imu[imu])])
+        for at, events, stamps, samples in serving.pieces(self.recording, int(begin_s * 1e6), int(end_s * 1e6), STEP_US):
+            self.step(events, serving.imu_rows(stamps + (self.clock_us - at) * 1000, samples))
 
     def stand(self, seconds, events=True, imu=True):
         """A few events of noise, and gravity."""
         for _ in range(round(seconds * 1e6 / STEP_US)):
             n = 2
-            noise = self.rows(np.zeros(n), self.random.integers(0, WIDTH, n), self.random.integers(0, HEIGHT, n), np.ones(n, int))
-            self.step(noise if events else None, [(self.clock_us * 1000, STILL)] if imu else None)
-
-    @staticmethod
-    def rows(dt, x, y, p):
-        rows = np.zeros(len(dt), dtype=[("dt", "<u4"), ("x", "<u2"), ("y", "<u2")])
-        rows["dt"], rows["x"], rows["y"] = dt, x, np.asarray(y, int) | np.asarray(p, int) << 15
-        return rows
+            noise = serving.event_rows(np.zeros(n), self.random.integers(0, WIDTH, n), self.random.integers(0, HEIGHT, n),
+                                       np.ones(n, int))
+            self.step(noise if events else None, serving.imu_rows([self.clock_us * 1000], [STILL]) if imu else None)
 
 
-class FaultsTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        scratch = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(scratch.cleanup)
-        cls.root = pathlib.Path(scratch.name)
-        cls.recording = Recording()
-        cls.folder = cls.recording.write(cls.root / "recording")
-
-    def serve(self, source, *arguments):
-        words = [EVPOSE, "serve", source, "--map", self.folder / "contours.ply", *arguments]
-        process = subprocess.Popen([str(w) for w in words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        for cleanup in (process.stdout.close, process.stderr.close, process.wait, process.kill):
-            self.addCleanup(cleanup)
-        return process
-
-    def serve_packets(self, *arguments):
-        port = free_port(socket.SOCK_STREAM)
-        process = self.serve(f"tcp://127.0.0.1:{port}", "--calibration", self.folder / "camchain-imucam.yaml", "--imu-model",
-                             self.folder / "imu.yaml", "--init", "0,0,1,0,0,0,1", "--set", "queue.shed=false", "-o",
-                             self.root / self.id(), *arguments)
+class FaultsTest(ServingTest):
+    def driven(self, *arguments):
+        process, port = self.serve_packets("-o", self.root / self.id(), *arguments)
         driver = Driver(port, self.recording)
         self.addCleanup(lambda: driver.socket.close())
         return process, driver
-
-    def finish(self, process):
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-        self.assertEqual(process.returncode, 130, out + err)
-        return out, err
 
     def tracked_after(self, clock_us):
         """Poses that count after a time of the driver's clock."""
@@ -131,7 +79,7 @@ class FaultsTest(unittest.TestCase):
         return sum(float(r.split()[0]) > clock_us * 1e-6 for r in rows if not r.startswith("#"))
 
     def test_the_imu_stops_for_two_seconds(self):
-        process, driver = self.serve_packets()
+        process, driver = self.driven()
         driver.play(0, PAUSE_S)
         driver.stand(2, imu=False)
         again = driver.clock_us
@@ -142,7 +90,7 @@ class FaultsTest(unittest.TestCase):
         self.assertGreater(self.tracked_after(again), 20)
 
     def test_events_stop_for_five_seconds(self):
-        process, driver = self.serve_packets()
+        process, driver = self.driven()
         driver.play(0, PAUSE_S)
         driver.stand(5, events=False)
         again = driver.clock_us
@@ -153,7 +101,7 @@ class FaultsTest(unittest.TestCase):
         self.assertGreater(self.tracked_after(again), 20)
 
     def test_the_clock_goes_back_by_a_second(self):
-        process, driver = self.serve_packets()
+        process, driver = self.driven()
         driver.clock_us += 1_000_000
         driver.play(0, PAUSE_S)
         driver.clock_us -= 1_000_000
@@ -164,9 +112,9 @@ class FaultsTest(unittest.TestCase):
         self.assertRegex(out, r"^(tracking|degraded)")
 
     def test_the_driver_is_killed_within_a_packet_and_comes_again(self):
-        process, driver = self.serve_packets()
+        process, driver = self.driven()
         driver.play(0, PAUSE_S)
-        driver.socket.sendall(driver.packet(1, bytes(800))[:300])
+        driver.socket.sendall(driver.packet(EVENTS, bytes(800))[:300])
         driver.socket.close()
         time.sleep(1)
         driver.clock_us += 1_000_000
@@ -181,7 +129,7 @@ class FaultsTest(unittest.TestCase):
 
     def test_a_browser_that_never_reads_costs_nothing(self):
         port = free_port(socket.SOCK_STREAM)
-        process = self.serve(self.folder, "--view", port, "--set", "replay.loop=true", "--set", "queue.shed=false")
+        process = self.start("serve", self.folder, "--view", port, "--set", "replay.loop=true", "--set", "queue.shed=false")
         key = base64.b64encode(os.urandom(16)).decode()
         clients = []
         for _ in range(3):
@@ -211,7 +159,7 @@ class FaultsTest(unittest.TestCase):
     def test_the_serial_line_goes_away(self):
         master, slave = os.openpty()
         name = os.ttyname(slave)
-        process = self.serve(self.folder, "--mavlink", f"serial://{name}:115200", "--set", "replay.loop=true")
+        process = self.start("serve", self.folder, "--mavlink", f"serial://{name}:115200", "--set", "replay.loop=true")
         heard = b""
         until = time.monotonic() + 10
         while b"\xfd" not in heard and time.monotonic() < until:
@@ -232,14 +180,11 @@ class FaultsTest(unittest.TestCase):
                 if kind == socket.SOCK_STREAM:
                     taken.listen()
                 port = taken.getsockname()[1]
-                process = self.serve(self.folder, option, port if option == "--view" else f"udpin://127.0.0.1:{port}")
+                process = self.start("serve", self.folder, option, port if option == "--view" else f"udpin://127.0.0.1:{port}")
                 out, err = process.communicate(timeout=30)
                 self.assertEqual(process.returncode, 2, out + err)
                 self.assertEqual(len([line for line in err.splitlines() if "in use" in line]), 1, err)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    EVPOSE = sys.argv.pop(1)
-    unittest.main()
+    serving.main(__doc__)

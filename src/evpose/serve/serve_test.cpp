@@ -335,6 +335,33 @@ TEST_F(SessionStory, EventsThatStopAreNamedAndSurvived) {
   EXPECT_NEAR(static_cast<double>(updates_.size()), 299, 2);
 }
 
+TEST_F(SessionStory, WithoutEventsForAWhileTheImuCarriesThePose) {
+  Session s = session();
+  feed(s, 0, kNsPerS);
+  feed(s, kNsPerS, 2 * kNsPerS, false, true);
+  feed(s, 2 * kNsPerS, 3 * kNsPerS);
+  EXPECT_TRUE(restarts_.empty());
+  EXPECT_EQ(starts_.size(), 1u);
+  EXPECT_NEAR(static_cast<double>(updates_.size()), 899, 1);
+}
+
+TEST_F(SessionStory, WithoutTheFirstEventsItStillStartsWhereAndWhenItWasTold) {
+  Session s = session(2 * kNsPerMs);
+  feed(s, 0, kNsPerS, false, true);
+  feed(s, kNsPerS, 2 * kNsPerS);
+  EXPECT_TRUE(restarts_.empty());
+  ASSERT_EQ(starts_.size(), 1u);
+  EXPECT_EQ(starts_[0].t, 2 * kNsPerMs);
+  EXPECT_NEAR(static_cast<double>(updates_.size()), 599, 1) << "the IMU's samples were kept";
+}
+
+TEST_F(SessionStory, WhenBothStoppedItStartsAnew) {
+  Session s = session();
+  feed(s, 0, kNsPerS);
+  feed(s, 2 * kNsPerS, 3 * kNsPerS);
+  EXPECT_EQ(restarts_.size(), 1u);
+}
+
 TEST_F(SessionStory, AnImuThatStopsIsNamedAndSurvivedAndEventsAreShed) {
   Session s = session();
   feed(s, 0, kNsPerS);

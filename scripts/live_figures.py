@@ -3,7 +3,7 @@
 """The figures of docs/live.md: delay, shedding and memory of evpose serve.
 
     live_figures.py EVPOSE SHARED               delay at 1x and under load, a minute
-    live_figures.py EVPOSE SHARED --soak 30     memory over so many minutes
+    live_figures.py EVPOSE SHARED --soak 30     memory over so many minutes of a hover in a loop; --speed 0.5: half as fast
 
 Delay is from an update's instant to its MAVLink bytes, read from the socket by `evpose mavlink check`; three outputs are
 on: MAVLink at 300 Hz, the viewer with a browser's connection that reads, and a run folder.
@@ -100,9 +100,10 @@ def figures(evpose, shared):
                   f"{words} | {updates[1]} of {possible} | {missed[1]} | {100 * int(events[2]) / int(events[1]):.1f} % |", flush=True)
 
 
-def soak(evpose, shared, minutes):
+def soak(evpose, shared, minutes, speed):
     with tempfile.TemporaryDirectory() as scratch:
-        served = Served(evpose, shared, "room_hover", "room", 60 * minutes + 5, f"{scratch}/run", "replay.loop=true")
+        served = Served(evpose, shared, "room_hover", "room", 60 * minutes + 5, f"{scratch}/run", "replay.loop=true",
+                        f"replay.speed={speed}")
         samples = []
         for _ in range(round(60 * minutes)):
             time.sleep(1)
@@ -112,7 +113,7 @@ def soak(evpose, shared, minutes):
     tenth = max(1, len(samples) // 10)
     print(f"memory: {sum(samples[tenth:2 * tenth]) / tenth:.1f} MB after a tenth of {minutes} minutes, "
           f"{sum(samples[-tenth:]) / tenth:.1f} MB over the last tenth, largest {max(samples):.1f} MB")
-    print(printed)
+    print(printed + heard)
 
 
 def main():
@@ -120,9 +121,10 @@ def main():
     parser.add_argument("evpose")
     parser.add_argument("shared", type=pathlib.Path)
     parser.add_argument("--soak", type=float, metavar="MINUTES")
+    parser.add_argument("--speed", type=float, default=1)
     arguments = parser.parse_args()
     if arguments.soak:
-        soak(arguments.evpose, arguments.shared, arguments.soak)
+        soak(arguments.evpose, arguments.shared, arguments.soak, arguments.speed)
     else:
         figures(arguments.evpose, arguments.shared)
 

@@ -42,7 +42,8 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   auto* source =
       command->add_option("source", track.recording,
                           "a recording; or udp://HOST:PORT, tcp://HOST:PORT, where a camera's driver "
-                          "sends packets; or ros, ros://EVENTS,IMU: topics of ROS");
+                          "sends packets; or metavision://SERIAL[+udp://HOST:PORT of the IMU]; or ros, "
+                          "ros://EVENTS,IMU: topics of ROS");
   command->add_option("--map", track.map, "contours (PLY, PCD, map.h5); default: the recording's own");
   command->add_option("--calibration", track.calibration, "calibration of any kind that evpose info knows");
   command->add_option("--imu-model", request->imu_model,

@@ -112,7 +112,7 @@ class PacketSource : public Source {
 
 }  // namespace
 
-bool is_source_address(const std::string& address) {
+bool is_packet_address(const std::string& address) {
   return address.rfind("udp://", 0) == 0 || address.rfind("tcp://", 0) == 0;
 }
 

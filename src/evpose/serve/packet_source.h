@@ -10,8 +10,8 @@
 
 namespace evpose {
 
-/// Whether the words are an address of a source: udp:// or tcp://.
-bool is_source_address(const std::string& address);
+/// Whether the words are an address of packets: udp:// or tcp://.
+bool is_packet_address(const std::string& address);
 
 /// Packets of a camera's driver by way of udp://HOST:PORT (datagrams to us) or tcp://HOST:PORT (one driver at
 /// a time connects to us). It never ends by itself; a driver that goes and comes again is named. Errors: no

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "evpose/core/parallel.h"
@@ -12,6 +13,7 @@
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
+#include "evpose/map_build/tiles.h"
 
 namespace evpose::map_build {
 namespace {
@@ -213,6 +215,85 @@ TEST(MapBuilder, TheSameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(one->map.points[i].position, three->map.points[i].position);
 }
 
+TEST(MapBuilder, WhereTheWallGoesOnAboveACupboardTheirEdgeIsOpen) {
+  for (const double height : {1.0, 1.6}) {
+    Scan scan(27);  // the side of a cupboard on a wall of 1.6 m
+    scan.rectangle({-0.8, 0, 0}, {1.6, 0, 0}, {0, 0, 1.6}).rectangle({0, 0, 0}, {0, 0.5, 0}, {0, 0, height});
+    const auto built = build(scan.cloud());
+    ASSERT_TRUE(built) << built.error().line();
+    double on_the_wall = 0;
+    for (std::size_t i = 0; i < built->map.points.size(); ++i) {
+      const ContourPoint& p = built->map.points[i];
+      const Eigen::Vector3d x = built->map.position(i);
+      if (p.kind == ContourKind::crease && std::abs(p.tangent.z()) > 0.9F && x.head<2>().norm() < 0.008)
+        on_the_wall += static_cast<double>(p.length);
+    }
+    if (height == 1.6)
+      EXPECT_GT(on_the_wall, 1.4);
+    else
+      EXPECT_LT(on_the_wall, 0.1);
+  }
+}
+
+TEST(Tiles, EachPointIsHeldByOneAndNoTileIsTooLarge) {
+  std::mt19937 random(28);
+  std::uniform_real_distribution<float> across(0, 60), along(0, 25);
+  std::vector<Eigen::Vector3f> points(20000);
+  for (auto& p : points) p = {across(random), along(random), 0};
+  const auto tiles = cut_into_tiles(points, 6000, 1);
+  EXPECT_EQ(tiles.size(), 4U);
+  std::vector<std::size_t> held(tiles.size(), 0);
+  for (const auto& p : points) {
+    int holders = 0;
+    for (std::size_t k = 0; k < tiles.size(); ++k)
+      if (tiles[k].holds(p)) ++holders, ++held[k];
+    EXPECT_EQ(holders, 1);
+  }
+  for (const std::size_t count : held) EXPECT_LT(count, 6600U);
+}
+
+TEST(Tiles, AClippedPieceLiesInItsCore) {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  Piece piece;
+  piece.begin = {0, 0, 0};
+  piece.end = {4, 2, 1};
+  const auto half = clipped(piece, {{1, -kFar}, {3, kFar}, 0.5F});
+  ASSERT_TRUE(half);
+  EXPECT_TRUE(half->begin.isApprox(Eigen::Vector3d(1, 0.5, 0.25)));
+  EXPECT_TRUE(half->end.isApprox(Eigen::Vector3d(3, 1.5, 0.75)));
+  EXPECT_FALSE(clipped(piece, {{5, -kFar}, {kFar, kFar}, 0.5F}));
+}
+
+TEST(Tiles, ACreaseAcrossTilesIsWholeAndStraight) {
+  Scan scan(29);  // a kerb of 30 m along x
+  scan.rectangle({0, 0, 0}, {30, 0, 0}, {0, 0.6, 0}, 1600)
+      .rectangle({0, 0, 0}, {30, 0, 0}, {0, 0, 0.5}, 1600);
+  BuildConfig config;
+  config.tile_points = 20'000;
+  ThreadPool pool(2);
+  const auto built = build_map(scan.cloud(), config, pool, [](double) { return true; });
+  ASSERT_TRUE(built) << built.error().line();
+  EXPECT_GT(built->figures.tiles, 1U);
+  double length = 0;
+  for (std::size_t i = 0; i < built->map.points.size(); ++i) {
+    const ContourPoint& p = built->map.points[i];
+    if (p.kind != ContourKind::crease || std::abs(p.tangent.x()) < 0.9F) continue;
+    EXPECT_LT(built->map.position(i).tail<2>().norm(), 0.005);
+    length += static_cast<double>(p.length);
+  }
+  EXPECT_NEAR(length, 30, 0.3);
+}
+
+TEST(Tiles, OrderOfThePointsDoesNotMatterAndDuplicatesGo) {
+  PointCloud one = room_corner(30), other = one;
+  std::mt19937 random(31);
+  other.points.insert(other.points.end(), one.points.begin(), one.points.begin() + 100);
+  std::shuffle(other.points.begin(), other.points.end(), random);
+  EXPECT_EQ(put_in_order(one), 0U);
+  EXPECT_EQ(put_in_order(other), 100U);
+  EXPECT_EQ(one.points, other.points);
+}
+
 TEST(MapBuilder, WhatIsNoSurfaceIsNamed) {
   Scan line(5), sparse(6);
   PointCloud on_a_line;
@@ -320,6 +401,26 @@ TEST(Outline, HasTheAreaOfThePlateWithoutItsHole) {
   EXPECT_GT(twice_area(outline.rings[0].corners), 0);
   EXPECT_NEAR(0.5 * (twice_area(outline.rings[0].corners) + twice_area(outline.rings[1].corners)), 1.2 - 0.24,
               0.08);
+  // What hides for certain is smaller by a cell all round.
+  ASSERT_EQ(outline.solid.size(), 2U);
+  const double solid = 0.5 * (twice_area(outline.solid[0].corners) + twice_area(outline.solid[1].corners));
+  EXPECT_NEAR(solid, 1.2 - 0.24 - outline.cell_m * (2 * 2.2 + 2 * 1.0), 0.08);
+}
+
+TEST(Outline, WhatPointsAreTooFewToCoverHidesNothing) {
+  ThreadPool pool(1);
+  Scan scan(32);  // a wall; over half of it only slats of 3 cm, 12 cm apart, have points
+  scan.rectangle({0, 0, 0}, {1, 0, 0}, {0, 1.2, 0}, 8000);
+  for (int k = 0; k < 8; ++k) scan.rectangle({1.09 + 0.12 * k, 0, 0}, {0.03, 0, 0}, {0, 1.2, 0}, 8000);
+  const auto points = scan.cloud().points;
+  const auto surface = describe_surface(points, *measure_scale(points, {}, "scan"), {}, pool);
+  const Planes planes = find_planes(surface, {});
+  ASSERT_GE(planes.planes.size(), 1U);
+  double solid = 0;
+  for (const FittedPlane& plane : planes.planes)
+    for (const Ring& ring : trace_outline(surface, plane).solid) solid += 0.5 * twice_area(ring.corners);
+  EXPECT_GT(solid, 0.9);
+  EXPECT_LT(solid, 1.25);
 }
 
 TEST(MapFile, KeepsPlanesAndPolygonsAndTheyHide) {

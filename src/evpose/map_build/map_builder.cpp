@@ -4,45 +4,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <optional>
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
 #include "evpose/map/triangulation.h"
+#include "evpose/map_build/tiles.h"
 
 namespace evpose::map_build {
 namespace {
 
 const Error kGivenUp{"map build", "interrupted", "nothing was written"};
-
-/// Points at exactly the same place say the same; returns how many were removed.
-std::size_t remove_duplicates(PointCloud& cloud) {
-  std::vector<std::uint32_t> order(cloud.points.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const auto before = [&](std::uint32_t a, std::uint32_t b) {
-    const Eigen::Vector3f &p = cloud.points[a], &q = cloud.points[b];
-    if (p.x() != q.x()) return p.x() < q.x();
-    if (p.y() != q.y()) return p.y() < q.y();
-    if (p.z() != q.z()) return p.z() < q.z();
-    return a < b;
-  };
-  std::sort(order.begin(), order.end(), before);
-  std::vector<bool> doubled(cloud.points.size(), false);
-  std::size_t removed = 0;
-  for (std::size_t k = 1; k < order.size(); ++k)
-    if (cloud.points[order[k]] == cloud.points[order[k - 1]]) doubled[order[k]] = true, ++removed;
-  if (removed == 0) return 0;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    if (doubled[i]) continue;
-    cloud.points[kept] = cloud.points[i];
-    if (!cloud.brightness.empty()) cloud.brightness[kept] = cloud.brightness[i];
-    ++kept;
-  }
-  cloud.points.resize(kept);
-  if (!cloud.brightness.empty()) cloud.brightness.resize(kept);
-  return removed;
-}
 
 void add_points(const Piece& piece, std::int32_t number, double spacing_m, ContourMap& map) {
   const int count = std::max(1, static_cast<int>(std::lround(piece.length_m() / spacing_m)));
@@ -89,7 +61,7 @@ void add_polygons(const FittedPlane& plane, std::int32_t number, const Outline& 
                   const std::vector<Piece>& pieces, double noise_m, ContourMap& map) {
   const PlaneFrame frame(plane);
   const auto first = static_cast<std::int32_t>(map.polygons.size());
-  for (const Ring& ring : outline.rings) {
+  for (const Ring& ring : outline.solid) {
     MapPolygon polygon;
     polygon.plane = number;
     polygon.hole_of = ring.hole_of < 0 ? -1 : first + ring.hole_of;
@@ -136,23 +108,24 @@ void describe(ConfigTable& table, BuildConfig& c) {
   table.add("boundary_length", c.boundary.least_length_m, "m", "least of a free boundary", {0, 10});
   table.add("boundary_sigma", c.boundary.most_sigma_m, "m", "most error of a free boundary", {0, 1});
   table.add("point_spacing", c.point_spacing_m, "m", "of the contours' points", {0.001, 1});
+  table.add("tile_points", c.tile_points, "", "of a cloud's tile", {1e4, 1e9});
+  table.add("tile_overlap", c.tile_overlap_m, "m", "that tiles see of their neighbours", {0, 100});
 }
 
-Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, ThreadPool& pool,
-                             const std::function<bool(double)>& progress) {
-  BuiltMap out;
+namespace {
+
+/// Finds what one tile holds and adds to the map what lies in its core.
+Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config, ThreadPool& pool,
+                  const std::function<bool(double)>& progress, BuiltMap& out) {
   ContourMap& map = out.map;
   BuildFigures& figures = out.figures;
-  map.anchor = cloud.anchor;
-  map.source = cloud.source;
-  figures.points = cloud.points.size();
-  figures.duplicates = remove_duplicates(cloud);
+  figures.duplicates += put_in_order(cloud);
   const auto scale = measure_scale(cloud.points, config.patch, cloud.source);
   if (!scale) return scale.error();
-  figures.scale = *scale;
   if (!progress(0.1)) return kGivenUp;
   const SurfacePoints surface = describe_surface(std::move(cloud.points), *scale, config.patch, pool);
   if (!progress(0.6)) return kGivenUp;
+  const Neighbours tree(surface.position);
   const Planes planes = find_planes(surface, config.plane);
   if (planes.planes.empty()) return Error{cloud.source, "no plane has enough points", "give a denser cloud"};
   if (!progress(0.8)) return kGivenUp;
@@ -162,7 +135,6 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   for (std::size_t p = 0; p < unfit.size(); ++p)
     unfit[p] = unfit[p] || planes.planes[p].rms_m > roughest_m ||
                planes.planes[p].tilt_sigma_rad() > config.plane.most_tilt_rad;
-  const Neighbours tree(surface.position);
   const std::vector<Piece> creases = find_creases(surface, tree, planes, unfit, config.crease, pool);
   if (!progress(0.85)) return kGivenUp;
   std::vector<std::vector<Piece>> pieces(planes.planes.size());
@@ -180,28 +152,62 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
     }
   });
   if (!progress(0.95)) return kGivenUp;
-  std::int32_t number = 0;
-  for (const Piece& piece : creases) {
-    add_points(piece, number++, config.point_spacing_m, map);
-    figures.crease_m += piece.length_m();
-  }
+  const auto first_plane = static_cast<std::int32_t>(map.planes.size());
+  const auto add = [&](const Piece& whole, double& length_m) {
+    std::optional<Piece> piece = clipped(whole, tile);
+    if (!piece) return;
+    piece->plane_a += first_plane;
+    if (piece->plane_b >= 0) piece->plane_b += first_plane;
+    const std::int32_t number = map.points.empty() ? 0 : map.points.back().contour + 1;
+    add_points(*piece, number, config.point_spacing_m, map);
+    length_m += piece->length_m();
+  };
+  for (const Piece& piece : creases) add(piece, figures.crease_m);
   for (std::size_t p = 0; p < planes.planes.size(); ++p) {
     const FittedPlane& plane = planes.planes[p];
-    for (const Piece& piece : boundaries[p].pieces) {
-      add_points(piece, number++, config.point_spacing_m, map);
-      figures.boundary_m += piece.length_m();
-    }
+    for (const Piece& piece : boundaries[p].pieces) add(piece, figures.boundary_m);
     figures.shadow_m += boundaries[p].shadow_m;
-    figures.in_planes += plane.points.size();
+    for (const std::uint32_t i : plane.points) figures.in_planes += tile.holds(surface.position[i]) ? 1 : 0;
     figures.curved += curved[p] ? 1 : 0;
     pieces[p].insert(pieces[p].end(), boundaries[p].pieces.begin(), boundaries[p].pieces.end());
-    add_polygons(plane, static_cast<std::int32_t>(p), outlines[p], pieces[p], scale->noise_m, map);
+    add_polygons(plane, first_plane + static_cast<std::int32_t>(p), outlines[p], pieces[p], scale->noise_m,
+                 map);
     map.planes.push_back({plane.normal.cast<float>(), plane.d,
                           static_cast<std::uint32_t>(plane.points.size()), static_cast<float>(plane.rms_m)});
   }
-  figures.planes = map.planes.size();
+  figures.scale = *scale;
+  return {};
+}
+
+}  // namespace
+
+Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, ThreadPool& pool,
+                             const std::function<bool(double)>& progress) {
+  BuiltMap out;
+  ContourMap& map = out.map;
+  map.anchor = cloud.anchor;
+  map.source = cloud.source;
+  out.figures.points = cloud.points.size();
+  const std::vector<Tile> tiles = cut_into_tiles(cloud.points, config.tile_points, config.tile_overlap_m);
+  out.figures.tiles = tiles.size();
+  std::optional<Error> barren;  // what a tile without planes said
+  for (std::size_t k = 0; k < tiles.size(); ++k) {
+    bool given_up = false;
+    const auto share = [&](double done) {
+      given_up = !progress((static_cast<double>(k) + done) / static_cast<double>(tiles.size()));
+      return !given_up;
+    };
+    PointCloud part = tiles.size() == 1 ? std::move(cloud) : part_of(cloud, tiles[k]);
+    if (!share(0)) return kGivenUp;
+    if (const Status done = build_tile(std::move(part), tiles[k], config, pool, share, out); !done) {
+      if (given_up) return kGivenUp;
+      barren = done.error();
+    }
+  }
+  out.figures.planes = map.planes.size();
+  if (map.planes.empty() && barren) return *barren;
   if (map.points.empty())
-    return Error{cloud.source, text("no contour among ", figures.planes, " planes"),
+    return Error{map.source, text("no contour among ", out.figures.planes, " planes"),
                  "give a larger or denser cloud"};
   map.occluders = triangulated(map.planes, map.polygons);
   return out;

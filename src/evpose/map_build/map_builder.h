@@ -26,11 +26,14 @@ struct BuildConfig {
   CreaseConfig crease;
   BoundaryConfig boundary;
   double point_spacing_m = 0.02;  ///< of the contours' points in the map
+  double tile_points = 4e6;       ///< larger clouds are worked on in tiles of about so many points ...
+  double tile_overlap_m = 1;      ///< ... which see so much of their neighbours
 };
 void describe(ConfigTable& table, BuildConfig& config);
 
 /// What a build found, for people.
 struct BuildFigures {
+  std::size_t tiles = 0;
   std::size_t points = 0, duplicates = 0, in_planes = 0, planes = 0, curved = 0;
   CloudScale scale;
   double crease_m = 0, boundary_m = 0, shadow_m = 0;  ///< lengths; shadows are left out of the map
@@ -42,9 +45,11 @@ struct BuiltMap {
 };
 
 /// From points to planes to contours (EV-Pose, Map Construction; design 5.10). The same for any number of
-/// threads. `progress` is told the share done, 0..1; the work is given up with an error when it returns
-/// false. Errors: too few points, on lines or spots, or so sparse that nothing is flat; no plane or no
-/// contour is found.
+/// threads. Clouds of more than `tile_points` are worked on in upright tiles, one after the other; beyond the
+/// cloud itself the memory is that of a tile. Contours end at the tiles' borders and go on beyond them; the
+/// scale is measured in each tile. `progress` is told the share done, 0..1; the work is given up with an
+/// error when it returns false. Errors: too few points, on lines or spots, or so sparse that nothing is flat;
+/// no plane or no contour is found.
 Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, ThreadPool& pool,
                              const std::function<bool(double)>& progress);
 

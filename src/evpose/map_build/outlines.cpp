@@ -12,6 +12,7 @@ namespace {
 constexpr double kCellSpacings = 2;  // cell size in point spacings: 4 points to a cell
 constexpr std::size_t kMostCells = 4'000'000;
 constexpr int kSmallestHole = 9;  // cells: smaller ones are gaps between points
+constexpr double kSolid = 0.5;    // share of its area that the points of a hiding surface stand for
 
 /// Cells of a plane, with an empty margin around them.
 class Grid {
@@ -47,6 +48,33 @@ void close_gaps(Grid& grid) {
       for (int k = 0; k < 9; ++k) around += before.full(c + k % 3 - 1, r + k / 3 - 1) ? 1 : 0;
       if (around >= 5) grid.at(c, r) = 1;
     }
+}
+
+/// The cells whose surroundings the points cover and that have no empty cell beside them. `covered`: share of
+/// each cell that its points stand for.
+Grid solid_cells(const Grid& grid, const std::vector<double>& covered) {
+  Grid well(grid.columns(), grid.rows()), out = well;
+  const auto around = [](int k) { return std::pair(k % 3 - 1, k / 3 - 1); };
+  for (int r = 1; r + 1 < grid.rows(); ++r)
+    for (int c = 1; c + 1 < grid.columns(); ++c) {
+      double sum = 0;
+      for (int k = 0; k < 9; ++k) {
+        const auto [x, y] = around(k);
+        sum += covered[static_cast<std::size_t>(r + y) * static_cast<std::size_t>(grid.columns()) +
+                       static_cast<std::size_t>(c + x)];
+      }
+      // Cells at the border have fewer filled ones around.
+      int filled = 0;
+      for (int k = 0; k < 9; ++k) filled += grid.full(c + around(k).first, r + around(k).second) ? 1 : 0;
+      well.at(c, r) = grid.full(c, r) && sum >= kSolid * filled ? 1 : 0;
+    }
+  for (int r = 1; r + 1 < grid.rows(); ++r)
+    for (int c = 1; c + 1 < grid.columns(); ++c) {
+      bool inner = true;
+      for (int k = 0; k < 9; ++k) inner = inner && well.full(c + around(k).first, r + around(k).second);
+      out.at(c, r) = inner ? 1 : 0;
+    }
+  return out;
 }
 
 /// Connected cells of one state; calls visit(cells, touches_margin) for each group.
@@ -198,6 +226,37 @@ std::vector<Eigen::Vector2d> straightened(const std::vector<Eigen::Vector2d>& ri
   return out;
 }
 
+namespace {
+
+/// Straightened rings of a grid in plane coordinates, outer ones before their holes.
+std::vector<Ring> straight_rings(const Grid& grid, const Eigen::Vector2d& low, double cell_m) {
+  std::vector<Ring> out, holes;
+  for (const auto& corners : rings_of(grid)) {
+    std::vector<Eigen::Vector2d> ring;
+    for (const auto& corner : corners)
+      ring.push_back(low + cell_m * (corner.cast<double>() - Eigen::Vector2d(2, 2)));
+    Ring traced;
+    traced.corners = straightened(ring, 0.8 * cell_m);
+    traced.coarse = straightened(ring, 1.5 * cell_m);
+    if (traced.corners.size() < 3) continue;
+    (twice_area(traced.corners) > 0 ? out : holes).push_back(std::move(traced));
+  }
+  const std::size_t outer = out.size();
+  for (Ring& hole : holes) {
+    // The smallest outer ring around it.
+    double smallest = INFINITY;
+    for (std::size_t k = 0; k < outer; ++k) {
+      const double area = twice_area(out[k].corners);
+      if (area < smallest && contains(out[k].corners, hole.corners.front()))
+        smallest = area, hole.hole_of = static_cast<int>(k);
+    }
+    if (hole.hole_of >= 0) out.push_back(std::move(hole));
+  }
+  return out;
+}
+
+}  // namespace
+
 Outline trace_outline(const SurfacePoints& surface, const FittedPlane& plane) {
   Outline out;
   const PlaneFrame frame(plane);
@@ -212,9 +271,16 @@ Outline trace_outline(const SurfacePoints& surface, const FittedPlane& plane) {
                         std::sqrt((size.x() + 0.1) * (size.y() + 0.1) / static_cast<double>(kMostCells)));
   const auto cells = [&](double length) { return static_cast<int>(length / out.cell_m) + 5; };
   Grid grid(cells(size.x()), cells(size.y()));
-  for (const auto& p : flat)
-    grid.at(static_cast<int>((p.x() - low.x()) / out.cell_m) + 2,
-            static_cast<int>((p.y() - low.y()) / out.cell_m) + 2) = 1;
+  std::vector<double> covered(
+      static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()), 0);
+  for (std::size_t k = 0; k < flat.size(); ++k) {
+    const int c = static_cast<int>((flat[k].x() - low.x()) / out.cell_m) + 2;
+    const int r = static_cast<int>((flat[k].y() - low.y()) / out.cell_m) + 2;
+    const double share = static_cast<double>(surface.spacing_m[plane.points[k]]) / out.cell_m;
+    grid.at(c, r) = 1;
+    covered[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.columns()) +
+            static_cast<std::size_t>(c)] += share * share;
+  }
   close_gaps(grid);
   for_groups(grid, false, [&](const auto& group, bool margin) {
     if (!margin && group.size() < kSmallestHole)
@@ -224,28 +290,8 @@ Outline trace_outline(const SurfacePoints& surface, const FittedPlane& plane) {
     if (group.size() < 4)
       for (const auto& [c, r] : group) grid.at(c, r) = 0;
   });
-  std::vector<Ring> holes;
-  for (const auto& corners : rings_of(grid)) {
-    std::vector<Eigen::Vector2d> ring;
-    for (const auto& corner : corners)
-      ring.push_back(low + out.cell_m * (corner.cast<double>() - Eigen::Vector2d(2, 2)));
-    Ring traced;
-    traced.corners = straightened(ring, 0.8 * out.cell_m);
-    traced.coarse = straightened(ring, 1.5 * out.cell_m);
-    if (traced.corners.size() < 3) continue;
-    (twice_area(traced.corners) > 0 ? out.rings : holes).push_back(std::move(traced));
-  }
-  const std::size_t outer = out.rings.size();
-  for (Ring& hole : holes) {
-    // The smallest outer ring around it.
-    double smallest = INFINITY;
-    for (std::size_t k = 0; k < outer; ++k) {
-      const double area = twice_area(out.rings[k].corners);
-      if (area < smallest && contains(out.rings[k].corners, hole.corners.front()))
-        smallest = area, hole.hole_of = static_cast<int>(k);
-    }
-    if (hole.hole_of >= 0) out.rings.push_back(std::move(hole));
-  }
+  out.rings = straight_rings(grid, low, out.cell_m);
+  out.solid = straight_rings(solid_cells(grid, covered), low, out.cell_m);
   return out;
 }
 

@@ -31,6 +31,7 @@ struct Ring {
 /// are straightened to within a cell. `cell_m` is told back.
 struct Outline {
   std::vector<Ring> rings;  ///< outer rings before their holes
+  std::vector<Ring> solid;  ///< around what hides for certain: well covered by points, a cell within `rings`
   double cell_m = 0;
 };
 Outline trace_outline(const SurfacePoints& surface, const FittedPlane& plane);

@@ -126,11 +126,14 @@ SurfacePoints describe_surface(std::vector<Eigen::Vector3f> points, const CloudS
   const Neighbours tree(out.position);
   const double enough = config.normal_sigma_rad * config.normal_sigma_rad;
   const int most = std::min(config.most, 2 * scale.neighbours);
+  const auto usual = static_cast<std::size_t>(std::clamp(
+      scale.neighbours * 9 / 8 + 1, SurfacePoints::kLinks + 1, std::max(most, SurfacePoints::kLinks + 1)));
   pool.for_chunks(count, 4096, [&](std::size_t, std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> near(static_cast<std::size_t>(std::max(most, SurfacePoints::kLinks + 1)));
     std::vector<float> squares(near.size());
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t found = tree.nearest(out.position[i], near, squares);
+      // Most patches need no more than the typical number.
+      std::size_t found = tree.nearest(out.position[i], std::span(near).first(usual), squares);
       std::uint32_t* links = &out.links[i * SurfacePoints::kLinks];
       int linked = 0;
       for (std::size_t k = 0; k < found && linked < SurfacePoints::kLinks; ++k)
@@ -139,6 +142,8 @@ SurfacePoints describe_surface(std::vector<Eigen::Vector3f> points, const CloudS
       Moments moments;
       int next = std::max(config.least, scale.neighbours / 2);
       for (std::size_t k = 0; k < found; ++k) {
+        if (k + 1 == usual && found == usual && near.size() > usual)
+          found = tree.nearest(out.position[i], near, squares);
         moments.add((out.position[near[k]] - out.position[i]).cast<double>());
         if (moments.count < next && k + 1 < found) continue;
         const Shape shape = shape_of(moments);

@@ -79,6 +79,15 @@ void print_score(const char* name, const KindScore& s) {
               s.sigma_ratio);
 }
 
+void print_classes(const char* name, const char* unit, double scale,
+                   const std::array<RecallClass, 4>& classes) {
+  std::printf("%s", name);
+  for (const RecallClass& c : classes)
+    std::printf("   from %.3g %s: %.0f m, %.0f, %.0f", scale * c.from, unit, c.true_m, 100 * c.recall_5mm,
+                100 * c.recall_10mm);
+  std::printf("\n");
+}
+
 int compare(const std::string& built_path, const std::string& true_path, const std::string& cloud_path) {
   const auto built = read_contour_map(built_path);
   if (!built) return bad_input(built.error());
@@ -98,8 +107,11 @@ int compare(const std::string& built_path, const std::string& true_path, const s
   print_score("crease", score.crease);
   print_score("boundary", score.boundary);
   std::printf(
-      "true contours that do not count: %.1f m of edges under 0.3 m, %.1f m that the cloud did not see\n",
+      "true contours that do not count: %.1f m of edges under 0.3 m, %.1f m that the cloud did not see\n"
+      "recall %% at 5 and 10 mm of those that count\n",
       score.short_m, score.unseen_m);
+  print_classes("  by length          ", "m", 1, score.by_length);
+  print_classes("  by parallel edge at", "cm", 100, score.by_rival);
   return 0;
 }
 

@@ -12,7 +12,9 @@
 namespace evpose {
 namespace {
 
-constexpr float kLink_m = 0.035F;  // true points so near to each other, in line, are of one edge
+constexpr float kLink_m = 0.035F;          // true points so near to each other, in line, are of one edge
+constexpr float kSameEdge_m = 0.003F;      // ... and those so near across it
+constexpr float kFurthestRival_m = 0.08F;  // parallel edges further apart do not disturb each other
 
 std::vector<Eigen::Vector3f> positions(const ContourMap& map, const Eigen::Vector3d& anchor) {
   std::vector<Eigen::Vector3f> out;
@@ -21,8 +23,8 @@ std::vector<Eigen::Vector3f> positions(const ContourMap& map, const Eigen::Vecto
   return out;
 }
 
-/// Length of the straight edge that each point is part of.
-std::vector<double> edge_lengths(const ContourMap& map, const std::vector<Eigen::Vector3f>& at) {
+/// Number of the straight edge that each point is part of.
+std::vector<std::uint32_t> edges_of(const ContourMap& map, const std::vector<Eigen::Vector3f>& at) {
   std::vector<std::uint32_t> parent(at.size());
   std::iota(parent.begin(), parent.end(), 0U);
   const auto root = [&](std::uint32_t i) {
@@ -35,13 +37,43 @@ std::vector<double> edge_lengths(const ContourMap& map, const std::vector<Eigen:
     grid.for_candidates(at[i], [&](std::uint32_t j) {
       const Eigen::Vector3f d = at[j] - at[i];
       if (j <= i || d.norm() > kLink_m || std::abs(t.dot(map.points[j].tangent)) < 0.98F) return;
-      if ((d - t * t.dot(d)).norm() < 0.003F) parent[root(j)] = root(i);
+      if ((d - t * t.dot(d)).norm() < kSameEdge_m) parent[root(j)] = root(i);
     });
   }
-  std::vector<double> length(at.size(), 0), out(at.size());
-  for (std::uint32_t i = 0; i < at.size(); ++i) length[root(i)] += static_cast<double>(map.points[i].length);
-  for (std::uint32_t i = 0; i < at.size(); ++i) out[i] = length[root(i)];
+  std::vector<std::uint32_t> out(at.size());
+  for (std::uint32_t i = 0; i < at.size(); ++i) out[i] = root(i);
   return out;
+}
+
+/// Distance of the nearest point of another edge that runs parallel beside each point; infinite beyond
+/// kFurthestRival_m.
+std::vector<float> rivals_of(const ContourMap& map, const std::vector<Eigen::Vector3f>& at,
+                             const std::vector<std::uint32_t>& edge) {
+  const PointGrid grid(at, kFurthestRival_m);
+  std::vector<float> out(at.size(), INFINITY);
+  for (std::uint32_t i = 0; i < at.size(); ++i) {
+    const Eigen::Vector3f& t = map.points[i].tangent;
+    grid.for_candidates(at[i], [&](std::uint32_t j) {
+      if (edge[j] == edge[i] || std::abs(t.dot(map.points[j].tangent)) < 0.95F) return;
+      const Eigen::Vector3f d = at[j] - at[i];
+      const float along = t.dot(d), across = (d - along * t).norm();
+      if (std::abs(along) < kLink_m && across < kFurthestRival_m && across > kSameEdge_m)
+        out[i] = std::min(out[i], across);
+    });
+  }
+  return out;
+}
+
+void count(std::array<RecallClass, 4>& classes, double value, double weight, double across_m) {
+  std::size_t k = classes.size() - 1;
+  while (k > 0 && value < classes[k].from) --k;
+  classes[k].true_m += weight;
+  classes[k].recall_5mm += across_m <= 0.005 ? weight : 0;
+  classes[k].recall_10mm += across_m <= 0.010 ? weight : 0;
+}
+void finish(std::array<RecallClass, 4>& classes) {
+  for (RecallClass& c : classes)
+    if (c.true_m > 0) c.recall_5mm /= c.true_m, c.recall_10mm /= c.true_m;
 }
 
 /// A contour of one map beside a point of the other.
@@ -152,12 +184,17 @@ MapScore score_map(const ContourMap& built, const ContourMap& truth, const Point
   // Of a sparse cloud six points of the two surfaces lie further around.
   const float radius = std::max(static_cast<float>(config.seen_radius_m), 5 * typical_spacing(seen));
   const PointGrid seen_grid(seen, radius);
-  const auto lengths = edge_lengths(truth, of_truth);
+  const auto edges = edges_of(truth, of_truth);
+  std::vector<double> lengths(of_truth.size(), 0);
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    lengths[edges[i]] += static_cast<double>(truth.points[i].length);
+  const auto rivals = rivals_of(truth, of_truth, edges);
   MapScore out;
   for (std::size_t i = 0; i < of_truth.size(); ++i) {
     const ContourPoint& p = truth.points[i];
     const auto weight = static_cast<double>(p.length);
-    if (lengths[i] < config.long_m) {
+    const double length = lengths[edges[i]];
+    if (length < config.long_m) {
       out.short_m += weight;
       continue;
     }
@@ -171,8 +208,12 @@ MapScore score_map(const ContourMap& built, const ContourMap& truth, const Point
     }
     const Match match = in_built.nearest(of_truth[i], p.tangent);
     all.truth(weight, match);
+    count(out.by_length, length, weight, match.across_m);
+    count(out.by_rival, static_cast<double>(rivals[i]), weight, match.across_m);
     if (Tally* tally = of_kind(p.kind)) tally->truth(weight, match);
   }
+  finish(out.by_length);
+  finish(out.by_rival);
   out.all = all.finish();
   out.crease = crease.finish();
   out.boundary = boundary.finish();

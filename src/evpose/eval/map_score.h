@@ -28,8 +28,18 @@ struct KindScore {
   double sigma_ratio = 0;  ///< rms of distance / stated sigma, of what is within reach; 1 is honest
 };
 
+/// Recall of the true edges of one class.
+struct RecallClass {
+  double from = 0;    ///< metres; to the next class'
+  double true_m = 0;  ///< length that counts
+  double recall_5mm = 0, recall_10mm = 0;
+};
+
 struct MapScore {
   KindScore all, crease, boundary;
+  std::array<RecallClass, 4> by_length{{{0.3}, {0.6}, {1.2}, {2.4}}};
+  /// By the distance of the nearest other true edge that runs parallel. The noise of clouds is of this size.
+  std::array<RecallClass, 4> by_rival{{{0}, {0.03}, {0.05}, {0.08}}};
   double unseen_m = 0, short_m = 0;  ///< true contours that do not count for recall
 };
 

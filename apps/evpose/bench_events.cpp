@@ -80,19 +80,19 @@ void print(const std::string& name, const Tally& tally) {
   double all_gate = 0, all_used = 0;
   for (std::size_t o = 0; o < kOrigins; ++o) {
     used[o] = of(o, EventVerdict::contour) + of(o, EventVerdict::predicted);
-    gate[o] = used[o] + of(o, EventVerdict::drifting) + of(o, EventVerdict::wrong_polarity);
+    gate[o] = used[o] + of(o, EventVerdict::other_motion) + of(o, EventVerdict::wrong_polarity);
     all_gate += gate[o];
     all_used += used[o];
   }
   std::printf(
-      "### %s\n\n| events | in the gate | left out: polarity | left out: drift | used | share of the used "
+      "### %s\n\n| events | in the gate | left out: polarity | left out: motion | used | share of the used "
       "|\n",
       name.c_str());
   std::printf("|---|---|---|---|---|---|\n");
   for (std::size_t o = 0; o < kOrigins; ++o)
     std::printf("| %s | %.0f | %.1f %% | %.1f %% | %.0f | %.1f %% |\n", kOriginNames[o], gate[o],
                 100 * of(o, EventVerdict::wrong_polarity) / std::max(1.0, gate[o]),
-                100 * of(o, EventVerdict::drifting) / std::max(1.0, gate[o]), used[o],
+                100 * of(o, EventVerdict::other_motion) / std::max(1.0, gate[o]), used[o],
                 100 * used[o] / std::max(1.0, all_used));
   const double right = of(1, EventVerdict::predicted), wrong = of(1, EventVerdict::wrong_polarity);
   std::printf(

@@ -39,7 +39,7 @@ void describe(ConfigTable& table, EventAlignmentConfig& c) {
   table.add("buffer_sigma", c.buffer_sigma, "", "... and the normal flow so many sigma from zero", {0, 100});
   table.add("count_px", c.count_px, "px", "events so near teach the contrast", {0.1, 10});
   table.group("contrast", c.contrast);
-  table.group("drift", c.drift);
+  table.group("flow", c.flow);
   table.add("strip_px", c.strip_px, "px", "half length along the contour that a sample stands for", {1, 64});
   table.add("ambiguity_px", c.ambiguity_px, "px",
             "events between two contours as similarly near as this are left out", {0, 50});
@@ -53,7 +53,7 @@ EventAlignment::EventAlignment(ImageSize size, const EventAlignmentConfig& confi
       config_(config),
       index_(size, config.strip_px, config.ambiguity_px),
       contrast_(pieces, config.contrast),
-      drift_(config.drift) {}
+      flow_(config.flow) {}
 
 double EventAlignment::Slope::value() const {
   return weight > 0 ? std::clamp((inside - at_gate) / weight, kLeastSlope, 1.0) : 1;
@@ -124,18 +124,20 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
     const Line& line = lines_[static_cast<std::size_t>(owner.strip)];
     Sum& sum = sums_[static_cast<std::size_t>(owner.strip)];
     const float d = owner.distance + (e.on ? line.late_on : line.late_off);
-    if (std::abs(d) <= count_px) {
-      sum.net += e.on ? line.forward : -line.forward;
-      const float age_s = 1e-6F * age_us;
-      sum.near.n += 1, sum.near.age += age_s, sum.near.distance += d;
-      sum.near.age2 += age_s * age_s, sum.near.age_distance += age_s * d;
-    }
+    if (std::abs(d) <= count_px) sum.net += e.on ? line.forward : -line.forward;
     verdict(EventVerdict::beside);
     if (std::abs(d) > line.gate) continue;
     if (config_.polarity && (e.on ? line.wrong_on : line.wrong_off)) {
       verdict(EventVerdict::wrong_polarity);
       ++result->wrong_polarity;
       continue;
+    }
+    if (p.surface) {
+      const Strip& strip = strips_[static_cast<std::size_t>(owner.strip)];
+      const FlowMonitor::Answer answer = flow_.ask(*p.surface, e.x, e.y, e.on ? Polarity::on : Polarity::off,
+                                                   e.stamp_us, strip.nx, strip.ny, 1e6F * strip.speed);
+      sum.agree += answer == FlowMonitor::Answer::agrees;
+      sum.differ += answer == FlowMonitor::Answer::differs;
     }
     verdict(line.wrong_on || line.wrong_off ? EventVerdict::predicted : EventVerdict::contour);
     const float odds = line.odds * std::exp(line.exponent * d * d), w = odds / (1 + odds);
@@ -193,18 +195,14 @@ std::uint32_t EventAlignment::cluster_of(const ContourSample& s) const {
   return static_cast<std::uint32_t>((cy * columns + cx) * 4 + bin);
 }
 
-/// Numbers the samples' clusters and finds out which of them hold drifting events.
-void EventAlignment::watch_drift(const EventAlignmentProblem& p) {
-  drift_.advance(p.span_s);
+/// Numbers the samples' clusters and finds out which of them hold events that move otherwise.
+void EventAlignment::watch_flow(const EventAlignmentProblem& p) {
+  flow_.advance(p.span_s);
   cluster_numbers_.resize(p.samples.size());
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
-    const ContourSample& s = p.samples[i];
-    DriftMonitor::Events& near = sums_[i].near;
-    if (sums_[i].events == 0 && near.n == 0) continue;
-    cluster_numbers_[i] = cluster_of(s);
-    // Normals of a cluster point into one half of the image.
-    if (s.normal_px.y() < 0) near.distance = -near.distance, near.age_distance = -near.age_distance;
-    drift_.add(cluster_numbers_[i], near, std::abs(s.speed_px_s));
+    if (sums_[i].events == 0) continue;
+    cluster_numbers_[i] = cluster_of(p.samples[i]);
+    flow_.add(cluster_numbers_[i], sums_[i].agree, sums_[i].differ);
   }
 }
 
@@ -216,7 +214,7 @@ void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignme
     const std::uint32_t number = cluster_numbers_[i];
     if (number >= clusters_.size()) clusters_.resize(number + 1);
     Cluster& c = clusters_[number];
-    if (c.weight == 0) c.trust = drift_.trust(number);
+    if (c.weight == 0) c.trust = flow_.trust(number);
     c.weight += sums_[i].weight;
     c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
   }
@@ -237,7 +235,7 @@ void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignme
     const double shared =
         repeats * (config_.shared_sigma_px * config_.shared_sigma_px + c.map_variance / c.weight);
     const double scale = c.trust * own / (own + shared) / event_variance;
-    if (c.trust < 0.5) result->drifting += sum.events;
+    if (c.trust < 0.5) result->other_motion += sum.events;
     const Vector6d& J = p.samples[i].jacobian;
     result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * slope * sum.weight);
     result->vector -= scale * sum.offset * J;
@@ -245,18 +243,18 @@ void EventAlignment::weigh_clusters(const EventAlignmentProblem& p, EventAlignme
       offsets_.push_back({i, -sum.offset / (slope * sum.weight), scale * slope * sum.weight});
   }
   result->information.triangularView<Eigen::StrictlyUpper>() = result->information.transpose();
-  if (p.verdicts) tell_drifting(p);
+  if (p.verdicts) tell_other_motion(p);
   for (std::size_t i = 0; i < p.samples.size(); ++i)
     if (sums_[i].events > 0) clusters_[cluster_numbers_[i]] = {};
   result->mean_square_px2 = weight > 0 ? square / weight : 0;
 }
 
-void EventAlignment::tell_drifting(const EventAlignmentProblem& p) {
+void EventAlignment::tell_other_motion(const EventAlignmentProblem& p) {
   for (std::size_t k = 0; k < p.events.size(); ++k) {
     EventVerdict& verdict = (*p.verdicts)[k];
     if (verdict != EventVerdict::contour && verdict != EventVerdict::predicted) continue;
     const auto sample = static_cast<std::size_t>(owners_[k]);
-    if (clusters_[cluster_numbers_[sample]].trust < 0.5) verdict = EventVerdict::drifting;
+    if (clusters_[cluster_numbers_[sample]].trust < 0.5) verdict = EventVerdict::other_motion;
   }
 }
 
@@ -265,7 +263,7 @@ EventAlignmentResult EventAlignment::align(const EventAlignmentProblem& p) {
   prepare(p);
   sum_events(p, &result);
   learn_contrast(p);
-  watch_drift(p);
+  watch_flow(p);
   weigh_clusters(p, &result);
   result.slope = slope_.weight < kTelling ? 0 : slope_.value();
   result.captured = captured();

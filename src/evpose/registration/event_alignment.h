@@ -11,7 +11,7 @@
 #include "evpose/core/pose.h"
 #include "evpose/event/event_front.h"
 #include "evpose/registration/contrast_memory.h"
-#include "evpose/registration/drift_monitor.h"
+#include "evpose/registration/flow_monitor.h"
 #include "evpose/registration/strip_index.h"
 
 namespace evpose {
@@ -32,7 +32,7 @@ struct EventAlignmentConfig {
   double buffer_sigma = 3;         ///< ... and the normal flow this many sigma from zero
   double count_px = 1.5;           ///< events so near teach the contrast
   ContrastConfig contrast;
-  DriftConfig drift;
+  FlowConfig flow;
   double strip_px = 4;  ///< half length along the contour that a sample stands for
   double ambiguity_px =
       1.0;                   ///< events between two contours, with distances as similar as this, are left out
@@ -61,7 +61,7 @@ enum class EventVerdict : std::uint8_t {
   elsewhere,       ///< near no contour, or between two
   beside,          ///< near a contour, outside the gate
   wrong_polarity,  ///< in the gate, but of the excluded polarity
-  drifting,        ///< in the gate of a cell whose events drift
+  other_motion,    ///< in the gate of a cell whose events do not move as the ego-motion says
   contour,         ///< used
   predicted,       ///< used, and of the polarity that was predicted
 };
@@ -72,6 +72,7 @@ struct EventAlignmentProblem {
   double span_s;                       ///< since the last update
   std::span<const ContourSample> samples;
   const Matrix6d& pose_covariance;                ///< of the prediction
+  const TimeSurface* surface = nullptr;           ///< with these events; none: flow is not looked at
   std::vector<EventVerdict>* verdicts = nullptr;  ///< of each event, if asked for
 };
 
@@ -89,7 +90,7 @@ struct EventAlignmentResult {
   double slope = 1;  ///< how the mean distance answers to an offset: 0 for events spread evenly, or too few
   bool captured = true;        ///< the events in the gate gather at the contours
   int wrong_polarity = 0;      ///< events near contours that were left out for their polarity
-  int drifting = 0;            ///< events in the gate of cells that are mistrusted, by more than a half
+  int other_motion = 0;        ///< events in the gate of cells that are mistrusted, by more than a half
   double mean_square_px2 = 0;  ///< weighted, of the signed distances
 };
 
@@ -125,8 +126,8 @@ class EventAlignment {
   };
   struct Sum {
     double weight = 0, offset = 0, square = 0;
-    int events = 0, net = 0;  ///< net: events near by, for the contrast
-    DriftMonitor::Events near;
+    int events = 0, net = 0;    ///< net: events near by, for the contrast
+    int agree = 0, differ = 0;  ///< events in the gate that move as predicted, or not
   };
   /// How the mean distance answers to an offset: sums over events, slowly forgotten.
   struct Slope {
@@ -139,9 +140,9 @@ class EventAlignment {
   void prepare(const EventAlignmentProblem& problem);
   void sum_events(const EventAlignmentProblem& problem, EventAlignmentResult* result);
   void learn_contrast(const EventAlignmentProblem& problem);
-  void watch_drift(const EventAlignmentProblem& problem);
+  void watch_flow(const EventAlignmentProblem& problem);
   void weigh_clusters(const EventAlignmentProblem& problem, EventAlignmentResult* result);
-  void tell_drifting(const EventAlignmentProblem& problem);
+  void tell_other_motion(const EventAlignmentProblem& problem);
   std::uint32_t cluster_of(const ContourSample& sample) const;
   bool captured() const;
   bool polarity_is_wrong(const ContourSample& sample, int sign) const;
@@ -151,7 +152,7 @@ class EventAlignment {
   EventAlignmentConfig config_;
   StripIndex index_;
   ContrastMemory contrast_;
-  DriftMonitor drift_;
+  FlowMonitor flow_;
   Slope slope_;
   // Of the last call, one for each sample; kept so that nothing is allocated from call to call.
   std::vector<Strip> strips_;

@@ -344,8 +344,9 @@ double Tracker::plan_points(const Pose& T_map_body, double span_s) {
 Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, double span_s) {
   const Matrix6d covariance = fusion_->measured_covariance();
   if (config_.field == FieldKind::events) {
-    const EventAlignmentResult r = alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_,
-                                                     covariance, verdict_callback_ ? &verdicts_ : nullptr});
+    const EventAlignmentResult r =
+        alignment_.align({front_.kept(), front_.stamp(t), span_s, samples_, covariance, &front_.surface(),
+                          verdict_callback_ ? &verdicts_ : nullptr});
     if (verdict_callback_) verdict_callback_(front_.kept(), verdicts_);
     contours_.clear();
     if (fusion_->takes_contours())
@@ -361,7 +362,7 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
             std::sqrt(r.mean_square_px2),
             r.matched_events,
             r.wrong_polarity,
-            r.drifting,
+            r.other_motion,
             r.captured,
             r.slope};
   }
@@ -471,7 +472,7 @@ Update Tracker::update(TimeNs t) {
   out.residual = stpe.residual;
   out.events_matched = stpe.events;
   out.wrong_polarity = stpe.wrong_polarity;
-  out.drifting = stpe.drifting;
+  out.other_motion = stpe.other_motion;
   out.times = {events_time_s_, t1 - t0, t2 - t1, t3 - t2, now() - t3};
   counted_ = front_.counts();
   events_time_s_ = 0;

@@ -129,7 +129,7 @@ class Tracker {
     PoseInformation measurement;
     int points = 0, matched = 0;
     double residual = 0;
-    int events = 0, wrong_polarity = 0, drifting = 0;
+    int events = 0, wrong_polarity = 0, other_motion = 0;
     bool captured = true;
     double slope = 1;
   };

@@ -44,7 +44,7 @@ struct Update {
   std::int32_t points_matched = 0;  ///< of these, with events near by
   std::int32_t events_matched = 0;  ///< events in the gate (field: events)
   std::int32_t wrong_polarity = 0;  ///< events in the gate left out for their polarity
-  std::int32_t drifting = 0;        ///< events in the gate mistrusted for their drift
+  std::int32_t other_motion = 0;    ///< events in the gate of cells that move otherwise
   double residual = 0;              ///< RMS of event distances, px (events); of the loss, 0..1 (exponential)
   double innovation = 0;            ///< normalised innovation squared / 6
   StageTimes times;

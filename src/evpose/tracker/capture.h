@@ -30,7 +30,7 @@ struct CaptureConfig {
   double position_sigma_m = 0.1;  ///< around the last known pose when it was lost, per axis
   double rotation_sigma_rad = 0.035;
   double verify_s = 0.06;    ///< a pose found is watched for so long before it is called tracking
-  double patience_s = 0.15;  ///< lost, or events that do not gather at the contours, for so long: search
+  double patience_s = 0.5;   ///< lost, or events that do not gather at the contours, for so long: search
   double found_position_sigma_m = 3e-3, found_rotation_sigma_rad = 2e-3, found_velocity_sigma_m_s = 0.3;
   PoseSearchConfig search;
 };

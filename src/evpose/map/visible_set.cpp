@@ -15,7 +15,7 @@ namespace {
 constexpr int kBlockCubes = 8;                 // a block is 8 x 8 x 8 cubes
 constexpr float kOccluderCubes = 4;            // triangles are gathered in boxes of 4 x 4 x 4 cubes ...
 constexpr std::uint32_t kMostOccluders = 256;  // ... and by so many
-constexpr double kBegin = 0.7;                 // of the way to a refresh, the next choice is begun
+constexpr double kBegin = 0.3;                 // of the way to a refresh, the next choice is begun
 constexpr float kLookedAt = 0.4F;              // of the stride, in the image: spacing of the points looked at
 constexpr std::size_t kCellsAPoint = 200;      // filled in the time that a point takes
 constexpr double kDepthCell_px = 2;            // of the occluders' depth buffer

@@ -74,14 +74,14 @@ class ContourIndex {
 };
 
 struct VisibleSetConfig {
-  double far_m = 40;      ///< points further away are left out
-  double near_m = 0.1;    ///< points nearer are left out
-  double stride_px = 4;   ///< least distance of two points along one contour, in the image
-  int budget = 6000;      ///< most points in all
-  double margin_px = 12;  ///< points may lie this far outside of the image when chosen
-  double refresh_px = 8;  ///< chosen again before the view has moved by this much
-  int slice = 500;        ///< points and triangles looked at per update meanwhile, if that is fast enough
-  bool occlusion = true;  ///< leave out points behind the map's occluders, if it has any
+  double far_m = 40;       ///< points further away are left out
+  double near_m = 0.1;     ///< points nearer are left out
+  double stride_px = 4;    ///< least distance of two points along one contour, in the image
+  int budget = 6000;       ///< most points in all
+  double margin_px = 20;   ///< points may lie this far outside of the image when chosen
+  double refresh_px = 16;  ///< chosen again before the view has moved by this much
+  int slice = 500;         ///< points and triangles looked at per update meanwhile, if that is fast enough
+  bool occlusion = true;   ///< leave out points behind the map's occluders, if it has any
   double grazing_sin =
       0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
 };

@@ -85,7 +85,7 @@ TEST_F(VisibleLaws, SlicesChooseWhatOneCallChooses) {
   VisibleSet sliced(index_, *camera_, config), fresh(index_, *camera_, config);
   sliced.choose(pose_);
   Vector6d step = Vector6d::Zero();
-  step(5) = 0.036 * config.refresh_px / camera_->focal_px();
+  step(5) = 0.0155 * config.refresh_px / camera_->focal_px();
   const auto before = sliced.chosen();
   Pose at = pose_;
   for (int i = 0; i < 20; ++i)

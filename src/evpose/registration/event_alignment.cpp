@@ -132,7 +132,7 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
       ++result->wrong_polarity;
       continue;
     }
-    if (p.surface) {
+    if (p.surface && config_.flow.on) {
       const Strip& strip = strips_[static_cast<std::size_t>(owner.strip)];
       const FlowMonitor::Answer answer = flow_.ask(*p.surface, e.x, e.y, e.on ? Polarity::on : Polarity::off,
                                                    e.stamp_us, strip.nx, strip.ny, 1e6F * strip.speed);

@@ -11,9 +11,9 @@ namespace evpose {
 class ConfigTable;
 
 struct FlowConfig {
-  bool on = true;
-  double memory_s = 0.05;       ///< over which events of a cell are judged together
-  double from_px_s = 20;        ///< contours slower than this tell nothing
+  bool on = false;         ///< it costs more standing edges than it takes moving things, on what was measured
+  double memory_s = 0.05;  ///< over which events of a cell are judged together
+  double from_px_s = 20;   ///< contours slower than this tell nothing
   double least_deficit = 0.15;  ///< mistrust begins when so much of the usual share is missing ...
   double full_deficit = 0.3;    ///< ... and is complete here
   double sure_sigma = 3;        ///< ... if it is more than chance

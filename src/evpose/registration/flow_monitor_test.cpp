@@ -10,10 +10,16 @@ namespace {
 
 constexpr double kStep_s = 1.0 / 300;
 
+FlowConfig on() {
+  FlowConfig config;
+  config.on = true;
+  return config;
+}
+
 /// An upright edge that moves to the right at `speed_px_s` over a surface; the answers of its events when
 /// `expected_px_s` is predicted along the normal (nx, 0).
 int agreeing(double speed_px_s, float expected_px_s, float nx = 1) {
-  FlowMonitor monitor({});
+  FlowMonitor monitor(on());
   TimeSurface surface(64, 8);
   int agree = 0;
   for (int x = 0; x < 64; ++x) {
@@ -38,13 +44,13 @@ TEST(FlowMonitor, OneThatMovesOtherwiseDoesNot) {
 }
 
 TEST(FlowMonitor, SlowContoursTellNothing) {
-  const FlowMonitor monitor({});
+  const FlowMonitor monitor(on());
   const TimeSurface surface(64, 8);
   EXPECT_EQ(monitor.ask(surface, 20, 4, Polarity::on, 1000, 1, 0, 5), FlowMonitor::Answer::unknown);
 }
 
 TEST(FlowMonitor, ACellBelowTheUsualShareIsMistrustedAndForgivenLater) {
-  FlowMonitor monitor({});
+  FlowMonitor monitor(on());
   for (int k = 0; k < 20; ++k) {
     monitor.advance(kStep_s);
     for (std::uint32_t cell = 0; cell < 20; ++cell) monitor.add(cell, 7, 3);
@@ -58,7 +64,7 @@ TEST(FlowMonitor, ACellBelowTheUsualShareIsMistrustedAndForgivenLater) {
 }
 
 TEST(FlowMonitor, AFewEventsAreNoReason) {
-  FlowMonitor monitor({});
+  FlowMonitor monitor(on());
   for (std::uint32_t cell = 0; cell < 20; ++cell) monitor.add(cell, 70, 30);
   monitor.add(20, 0, 9);
   monitor.add(21, 6, 6);

@@ -29,8 +29,8 @@ struct CaptureConfig {
   double velocity_sigma_m_s = 2;  ///< of the vehicle when the search begins
   double position_sigma_m = 0.1;  ///< around the last known pose when it was lost, per axis
   double rotation_sigma_rad = 0.035;
-  double verify_s = 0.06;    ///< a pose found is watched for so long before it is called tracking
-  double patience_s = 0.5;   ///< lost, or events that do not gather at the contours, for so long: search
+  double verify_s = 0.06;   ///< a pose found is watched for so long before it is called tracking
+  double patience_s = 0.5;  ///< lost, or events that do not gather at the contours, for so long: search
   double found_position_sigma_m = 3e-3, found_rotation_sigma_rad = 2e-3, found_velocity_sigma_m_s = 0.3;
   PoseSearchConfig search;
 };

@@ -19,11 +19,11 @@ struct ImuWatchConfig {
   int clipped_samples = 4;  ///< so many equal readings at the largest value yet: saturated below its range
   int stuck_samples = 20;   ///< so many equal readings of one axis while others change: stuck
   double spike_sigma = 8;   ///< a reading so many usual changes from the one before is a spike ...
-  double spike_gyro_rad_s2 = 300;  ///< ... if a vehicle does not change its rate so fast, ...
-  double spike_accel_m_s3 = 5000;  ///< ... or its force
-  int spike_samples = 5;           ///< so many in a row are a change of the motion
-  double doubt_s = 0.25;           ///< stamps are doubted so long after a gap or a step back
-  double remember_s = 0.05;        ///< a fault is told so long after its last sign
+  double spike_gyro_rad_s2 = 1500;  ///< ... if a vehicle does not change its rate so fast, ...
+  double spike_accel_m_s3 = 2e4;    ///< ... or its force
+  int spike_samples = 2;            ///< so many in a row are a change of the motion
+  double doubt_s = 0.25;            ///< stamps are doubted so long after a gap or a step back
+  double remember_s = 0.05;         ///< a fault is told so long after its last sign
 };
 void describe(ConfigTable& table, ImuWatchConfig& config);
 

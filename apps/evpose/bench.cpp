@@ -25,6 +25,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_bench_capture(*bench, run);
   add_bench_events(*bench, run);
   add_bench_faults(*bench, run);
+  add_bench_picture(*bench, run);
 }
 
 }  // namespace evpose

@@ -17,6 +17,7 @@ void add_bench_calibration(CLI::App& bench, std::function<int()>& run);
 void add_bench_capture(CLI::App& bench, std::function<int()>& run);
 void add_bench_events(CLI::App& bench, std::function<int()>& run);
 void add_bench_faults(CLI::App& bench, std::function<int()>& run);
+void add_bench_picture(CLI::App& bench, std::function<int()>& run);
 
 /// The shared recordings of a folder with `maps`, by name: the room's and the courtyard's.
 struct PeerRecording {

@@ -40,6 +40,7 @@ const std::vector<Variant> kAblation{
     {"without noise filter", true, {"events.filter.on=false"}},
     {"without polarity", true, {"alignment.polarity=false"}},
     {"polarity without buffer zone", true, {"alignment.buffer_sigma=0"}},
+    {"with extraction of moving things", true, {"alignment.flow.on=true"}},
     {"without lateness", true, {"alignment.lateness=false"}},
     {"without honest slope", true, {"alignment.honest_slope=false"}},
     {"gate opened by the prediction's sigma", true, {"alignment.widest_gate_px=6"}},

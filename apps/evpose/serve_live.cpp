@@ -297,6 +297,7 @@ void describe(ConfigTable& table, ServeConfig& c) {
 Expected<ServeConfig> load_serve_config(const TrackRequest& request) {
   ServeConfig config;
   config.run.tracker.capture.on = false;  // a search takes longer than the data it looks at
+  config.run.tracker.threads = 2;
   ConfigTable table;
   describe(table, config);
   if (!request.config_file.empty())

@@ -2,6 +2,8 @@
 // Noise filter and time surface: speed by image size, and by layout of the events in memory.
 #include <benchmark/benchmark.h>
 
+#include <cmath>
+
 #include "evpose/bench/scene.h"
 #include "evpose/event/event_front.h"
 
@@ -33,6 +35,38 @@ BENCHMARK(front)
     ->Args({640, 480, 20})
     ->Args({1280, 720, 2})
     ->Args({1280, 720, 20})
+    ->Unit(benchmark::kMillisecond);
+
+/// What the relatives do for every update: the whole image's exponential surface, blurred, and its gradient.
+void dense_surface(benchmark::State& state) {
+  const int width = static_cast<int>(state.range(0)), height = static_cast<int>(state.range(1));
+  const auto w = static_cast<std::size_t>(width), n = w * static_cast<std::size_t>(height);
+  std::vector<double> age_s(n), surface(n), rows(n), blurred(n), gx(n), gy(n);
+  for (std::size_t i = 0; i < n; ++i) age_s[i] = 1e-4 * static_cast<double>(i * 7919 % 1000);
+  constexpr double kBlur[] = {0.0625, 0.25, 0.375, 0.25, 0.0625};
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < n; ++i) surface[i] = std::exp(-age_s[i] / 0.02);
+    for (std::size_t i = 2; i < n - 2; ++i) {
+      rows[i] = 0;
+      for (std::size_t k = 0; k < 5; ++k) rows[i] += kBlur[k] * surface[i + k - 2];
+    }
+    for (std::size_t i = 2 * w; i < n - 2 * w; ++i) {
+      blurred[i] = 0;
+      for (std::size_t k = 0; k < 5; ++k) blurred[i] += kBlur[k] * rows[i + k * w - 2 * w];
+    }
+    for (std::size_t i = w + 1; i < n - w - 1; ++i) {
+      const double *above = &blurred[i - w], *here = &blurred[i], *below = &blurred[i + w];
+      gx[i] = above[1] - above[-1] + 2 * (here[1] - here[-1]) + below[1] - below[-1];
+      gy[i] = below[-1] + 2 * below[0] + below[1] - above[-1] - 2 * above[0] - above[1];
+    }
+    benchmark::DoNotOptimize(gx.data());
+    benchmark::DoNotOptimize(gy.data());
+  }
+}
+BENCHMARK(dense_surface)
+    ->ArgNames({"width", "height"})
+    ->Args({640, 480})
+    ->Args({1280, 720})
     ->Unit(benchmark::kMillisecond);
 
 // The layouts that were candidates for `Event`: the pass over the events is the same, only their storage

@@ -73,6 +73,19 @@ Scene make_scene(int width, int height) {
   return scene;
 }
 
+void repeat_room(ContourMap& map, int rooms) {
+  const std::vector<ContourPoint> room = map.points;
+  constexpr int kRow = 16;
+  for (int i = 1; i < rooms; ++i) {
+    const Eigen::Vector3f shift(10.0F * static_cast<float>(i % kRow), 8.0F * static_cast<float>(i / kRow), 0);
+    for (ContourPoint p : room) {
+      p.position += shift;
+      p.contour += static_cast<std::int32_t>(room.size()) * i;
+      map.points.push_back(p);
+    }
+  }
+}
+
 EventPacket make_events(const Scene& scene, std::size_t count, double span_s) {
   std::vector<Eigen::Vector2d> seen;
   const Pose T_cam_map = scene.T_map_cam.inverse();

@@ -24,6 +24,9 @@ struct Scene {
 /// `width` x `height` of the image, with the same field of view for any.
 Scene make_scene(int width, int height);
 
+/// Makes a building of so many such rooms beside each other, 10 x 8 m each, without more occluders.
+void repeat_room(ContourMap& map, int rooms);
+
 /// `count` events over `span_s`: most near the projected contours, the rest anywhere, as from texture and
 /// noise.
 EventPacket make_events(const Scene& scene, std::size_t count, double span_s);

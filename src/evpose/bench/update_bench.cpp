@@ -84,9 +84,10 @@ BENCHMARK(update)
     ->Unit(benchmark::kMillisecond)
     ->Iterations(4);
 
-/// The choice of points when the view has moved (the dearest moment of an update).
+/// The choice of points when the view has moved (the dearest moment of an update), in a map of so many rooms.
 void visible_refresh(benchmark::State& state) {
-  const Scene scene = make_scene(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  Scene scene = make_scene(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  repeat_room(scene.map, static_cast<int>(state.range(2)));
   const ContourIndex index(scene.map);
   VisibleSetConfig config;
   config.refresh_px = 0;
@@ -101,9 +102,12 @@ void visible_refresh(benchmark::State& state) {
   state.counters["map_points"] = static_cast<double>(scene.map.points.size());
 }
 BENCHMARK(visible_refresh)
-    ->ArgNames({"width", "height"})
-    ->Args({640, 480})
-    ->Args({1280, 720})
+    ->ArgNames({"width", "height", "rooms"})
+    ->Args({640, 480, 1})
+    ->Args({1280, 720, 1})
+    ->Args({1280, 720, 10})
+    ->Args({1280, 720, 100})
+    ->Args({1280, 720, 250})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -15,10 +15,12 @@ namespace {
 constexpr int kBlockCubes = 8;                 // a block is 8 x 8 x 8 cubes
 constexpr float kOccluderCubes = 4;            // triangles are gathered in boxes of 4 x 4 x 4 cubes ...
 constexpr std::uint32_t kMostOccluders = 256;  // ... and by so many
-constexpr double kBegin = 0.3;                 // of the way to a refresh, the next choice is begun
+constexpr double kInTime = 0.9;                // of the way to a refresh, the next choice shall be there
 constexpr float kLookedAt = 0.4F;              // of the stride, in the image: spacing of the points looked at
 constexpr std::size_t kCellsAPoint = 200;      // filled in the time that a point takes
-constexpr double kDepthCell_px = 2;            // of the occluders' depth buffer
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+constexpr double kDepthCell_px = 2;  // of the occluders' depth buffer, in an image 640 wide
+constexpr double kWidth_px = 640;
 // Two points are on one contour of the image if their directions and offsets agree this well.
 constexpr float kSameDirectionSin = 0.2F;
 constexpr float kSameLine_px = 0.75F;
@@ -92,11 +94,11 @@ void describe(ConfigTable& table, VisibleSetConfig& c) {
   table.add("near_m", c.near_m, "m", "points nearer than this are left out", {1e-3, 100});
   table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
   table.add("budget", c.budget, "", "most points in all", {6, 65535});
-  table.add("margin_px", c.margin_px, "px", "points may lie this far outside of the image when chosen",
-            {0, 1000});
-  table.add("refresh_px", c.refresh_px, "px", "points are chosen again when the view has moved by this much",
-            {0, 1000});
-  table.add("slice", c.slice, "", "points and triangles looked at per update meanwhile", {100, 1e9});
+  table.add("margin_px", c.margin_px, "px",
+            "points may lie this far outside of the image when chosen, if it is 640 wide", {0, 1000});
+  table.add("refresh_px", c.refresh_px, "px",
+            "points are chosen again when the view has moved by this much, in an image 640 wide", {0, 1000});
+  table.add("updates", c.updates, "", "updates that a choice takes", {1, 1000});
   table.add("occlusion", c.occlusion, "leave out points behind the map's occluders, if it has any");
   table.add("grazing_sin", c.grazing_sin, "", "least sine of the angle between contour and line of sight",
             {0, 1});
@@ -223,11 +225,15 @@ void ContourIndex::near(const Eigen::Vector3d& centre_map, double radius_m,
   std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end());
 }
 
-VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config)
+VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config,
+                       bool background)
     : index_(index),
       camera_(camera),
       config_(config),
-      depth_(half_view(camera), kDepthCell_px / camera.focal_px()) {
+      background_(background),
+      depth_(half_view(camera), kDepthCell_px * camera.size().width / kWidth_px / camera.focal_px()) {
+  config_.margin_px *= camera.size().width / kWidth_px;
+  config_.refresh_px *= camera.size().width / kWidth_px;
   // Widest angle of a ray through the image's border, plus the margin.
   double widest = 0;
   const ImageSize size = camera.size();
@@ -239,11 +245,11 @@ VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const Vi
       widest = std::max(widest, ray ? std::acos(std::clamp(ray->z(), -1.0, 1.0)) : camera.valid_angle());
     }
   }
-  widest = std::min(widest + config.margin_px / camera.focal_px(), camera.valid_angle());
+  widest = std::min(widest + config_.margin_px / camera.focal_px(), camera.valid_angle());
   cone_cos_ = static_cast<float>(std::cos(widest));
   cone_sin_ = static_cast<float>(std::sin(widest));
-  columns_ = static_cast<int>((size.width + 2 * config.margin_px) / config.stride_px) + 4;
-  rows_ = static_cast<int>((size.height + 2 * config.margin_px) / config.stride_px) + 4;
+  columns_ = static_cast<int>((size.width + 2 * config_.margin_px) / config.stride_px) + 4;
+  rows_ = static_cast<int>((size.height + 2 * config_.margin_px) / config.stride_px) + 4;
   cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
 }
 
@@ -254,21 +260,41 @@ double VisibleSet::moved_px(const Pose& from, const Pose& to) const {
 }
 
 const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
-  const double moved = chosen_once_ ? moved_px(T_map_cam_, T_map_cam) : config_.refresh_px + 1;
-  if (moved > config_.refresh_px) {
-    // Too late for slices, unless what is under way is of this place.
-    if (!under_way_ || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px) start(T_map_cam);
-    work(std::numeric_limits<std::size_t>::max());
-  } else if (under_way_ || moved > kBegin * config_.refresh_px) {
-    if (!under_way_) start(T_map_cam);
-    // In equal slices until the move is complete, as far as it goes on like this.
-    const double step = last_ ? moved_px(*last_, T_map_cam) : 0, left = config_.refresh_px - moved;
-    const auto share = static_cast<std::size_t>(static_cast<double>(remaining_) *
-                                                std::min(1.0, 1.5 * step / std::max(left, 1e-9)));
-    work(std::max(share, static_cast<std::size_t>(config_.slice)));
-  }
+  const double moved = chosen_once_ ? moved_px(T_map_cam_, T_map_cam) : 2 * config_.refresh_px + 1;
+  const double step = last_ ? moved_px(*last_, T_map_cam) : 0;
   last_ = T_map_cam;
+  if (moved > config_.refresh_px) {
+    // Too late to take one's time, unless what is under way is of this place.
+    if (calls_left_ == 0 || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px) begin(T_map_cam);
+    complete();
+  } else if (calls_left_ > 0) {
+    if (--calls_left_ == 0)
+      complete();
+    else if (!job_.valid())
+      work(remaining_ / static_cast<std::size_t>(calls_left_ + 1));
+  } else if (moved + config_.updates * step > kInTime * config_.refresh_px) {
+    begin(T_map_cam);
+    if (background_) job_ = std::async(std::launch::async, [this] { work(kAll); });
+  }
   return points_;
+}
+
+void VisibleSet::begin(const Pose& T_map_cam) {
+  if (job_.valid()) job_.get();
+  start(T_map_cam);
+  calls_left_ = config_.updates;
+}
+
+void VisibleSet::complete() {
+  if (job_.valid())
+    job_.get();
+  else
+    work(kAll);
+  calls_left_ = 0;
+  points_.swap(next_points_);
+  T_map_cam_ = next_T_map_cam_;
+  nearest_m_ = next_nearest_m_;
+  chosen_once_ = true;
 }
 
 bool VisibleSet::outside_cone(const Eigen::Vector3f& centre, float radius) const {
@@ -278,10 +304,10 @@ bool VisibleSet::outside_cone(const Eigen::Vector3f& centre, float radius) const
 }
 
 void VisibleSet::start(const Pose& T_map_cam) {
-  under_way_ = true;
   next_T_map_cam_ = T_map_cam;
   next_points_.clear();
   chosen_.clear();
+  finished_ = false;
   std::fill(cells_.begin(), cells_.end(), -1);
   const ContourMap& map = index_.map();
   const Pose T_cam_map = T_map_cam.inverse();
@@ -336,7 +362,7 @@ void VisibleSet::work(std::size_t most) {
   }
   remaining_ -= std::min(remaining_, done);
   effort_ += done;
-  if (occluders_done_ == occluders_.size() && cubes_done_ == cubes_.size()) finish();
+  if (occluders_done_ == occluders_.size() && cubes_done_ == cubes_.size() && !finished_) finish();
 }
 
 std::size_t VisibleSet::cell_of(const Eigen::Vector2f& pixel) const {
@@ -389,6 +415,7 @@ void VisibleSet::look_at(std::uint32_t number) {
 }
 
 void VisibleSet::finish() {
+  finished_ = true;
   if (next_points_.size() > static_cast<std::size_t>(config_.budget)) {
     const auto middle = next_points_.begin() + config_.budget;
     std::nth_element(next_points_.begin(), middle, next_points_.end(),
@@ -396,13 +423,9 @@ void VisibleSet::finish() {
     next_points_.erase(middle, next_points_.end());
     std::sort(next_points_.begin(), next_points_.end());
   }
-  points_.swap(next_points_);
-  T_map_cam_ = next_T_map_cam_;
-  chosen_once_ = true;
-  under_way_ = false;
-  nearest_m_ = config_.far_m;
-  for (const std::uint32_t i : points_)
-    nearest_m_ = std::min(nearest_m_, (index_.map().position(i) - T_map_cam_.p).norm());
+  next_nearest_m_ = config_.far_m;
+  for (const std::uint32_t i : next_points_)
+    next_nearest_m_ = std::min(next_nearest_m_, (index_.map().position(i) - next_T_map_cam_.p).norm());
 }
 
 }  // namespace evpose

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <future>
 #include <optional>
 #include <vector>
 
@@ -78,9 +79,9 @@ struct VisibleSetConfig {
   double near_m = 0.1;     ///< points nearer are left out
   double stride_px = 4;    ///< least distance of two points along one contour, in the image
   int budget = 6000;       ///< most points in all
-  double margin_px = 20;   ///< points may lie this far outside of the image when chosen
-  double refresh_px = 16;  ///< chosen again before the view has moved by this much
-  int slice = 500;         ///< points and triangles looked at per update meanwhile, if that is fast enough
+  double margin_px = 20;   ///< points may lie this far outside of the image when chosen, if it is 640 wide
+  double refresh_px = 16;  ///< chosen again before the view has moved by this much, in an image 640 wide
+  int updates = 6;         ///< that a choice takes, fewer in fast motion
   bool occlusion = true;   ///< leave out points behind the map's occluders, if it has any
   double grazing_sin =
       0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
@@ -91,11 +92,13 @@ void describe(ConfigTable& table, VisibleSetConfig& config);
 /// update until the view has moved (EV-Pose 5.3, "view-limited, occlusion-aware").
 class VisibleSet {
  public:
-  VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config);
+  /// `background`: points are chosen on a thread of their own.
+  VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config,
+             bool background = false);
 
-  /// Point numbers of the map for a pose at most `refresh_px` from this one. They are chosen anew in slices,
-  /// over several calls, so that no call takes long; which depends on the poses of the calls and nothing
-  /// else.
+  /// Point numbers of the map for a pose at most `refresh_px` from this one. They are chosen anew in slices
+  /// over several calls, or meanwhile on another thread, so that no call takes long; which, and from which
+  /// call on, depends on the poses of the calls and nothing else.
   const std::vector<std::uint32_t>& choose(const Pose& T_map_cam);
 
   /// As of the last call of choose().
@@ -103,8 +106,10 @@ class VisibleSet {
 
  private:
   double moved_px(const Pose& from, const Pose& to) const;
+  void begin(const Pose& T_map_cam);
+  void complete();
   void start(const Pose& T_map_cam);
-  /// Looks at so many triangles and points, or a few more; the last slice puts the new choice into points_.
+  /// Looks at so many triangles and points, or a few more.
   void work(std::size_t most);
   std::uint32_t wanted(const ContourIndex::Cube& cube) const;
   void look_at(std::uint32_t number);
@@ -116,6 +121,7 @@ class VisibleSet {
   const ContourIndex& index_;
   const Camera& camera_;
   VisibleSetConfig config_;
+  bool background_;
   float cone_cos_, cone_sin_;  ///< of the cone around the optical axis that holds the image
   std::vector<std::uint32_t> points_;
   Pose T_map_cam_;        ///< of points_
@@ -124,8 +130,10 @@ class VisibleSet {
   std::optional<Pose> last_;  ///< of the last call
 
   // The choice under way.
-  bool under_way_ = false;
+  int calls_left_ = 0;  ///< until it is taken, 0: none is under way
   Pose next_T_map_cam_;
+  double next_nearest_m_ = 0;
+  bool finished_ = false;
   Eigen::Matrix3f R_cam_map_;
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
   std::size_t effort_ = 0;  ///< that it took so far
@@ -141,6 +149,7 @@ class VisibleSet {
   int columns_, rows_;
   std::vector<std::int32_t> cells_;
   std::vector<Chosen> chosen_;
+  std::future<void> job_;  ///< uses all of the above
 };
 
 }  // namespace evpose

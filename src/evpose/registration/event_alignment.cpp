@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kEdgePrior = 0.5;  // an event in the gate is of the contour rather than clutter
 constexpr double kGateRim = 0.8;    // events beyond this share of the gate tell the density at it
-constexpr double kSlope_s = 0.05;   // memory of the slope
+constexpr double kSlope_s = 0.05;   // memory of the slope ...
+constexpr double kLongest_s = 1;    // ... and while few events have told it
 constexpr double kLeastSlope = 0.15;
 constexpr double kLatest_px = 0.5;  // by so much events may come after a contour and still be found
 constexpr std::uint32_t kShareOut = 4;
@@ -108,7 +109,8 @@ void EventAlignment::prepare(const EventAlignmentProblem& p) {
 
 void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentResult* result) {
   sums_.assign(p.samples.size(), {});
-  const double keep = std::exp(-p.span_s / kSlope_s);
+  const double keep = std::clamp(2 * kTelling / std::max(slope_.weight, 1e-9), std::exp(-p.span_s / kSlope_s),
+                                 std::exp(-p.span_s / kLongest_s));
   slope_ = {keep * slope_.weight, keep * slope_.inside, keep * slope_.at_gate};
   const auto count_px = static_cast<float>(config_.count_px);
   if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);

@@ -27,7 +27,7 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
   if (e.accepted) last_accepted_ = e.t, any_accepted_ = true;
   const double silent_s = to_seconds(e.t - last_accepted_);
   Health next = Health::tracking;
-  std::string why = any_accepted_ ? "contours and events agree" : "";
+  std::string why;
   if (e.searching) {
     next = any_accepted_ ? Health::lost : Health::initialising;
     why = e.refused;
@@ -50,7 +50,7 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
     why = text("pose uncertain by ", e.sigma_px, " px: ", e.weakest);
   }
   reason->clear();
-  if (next != state_) *reason = why;
+  if (next != state_) *reason = next == Health::tracking ? "contours and events agree" : why;
   return state_ = next;
 }
 

@@ -57,8 +57,8 @@ double median(std::vector<double>& values) {
 
 void describe(ConfigTable& table, TrackerConfig& c) {
   table.add("rate_hz", c.rate_hz, "Hz", "updates per second of data time", {1, 5000});
-  table.add("threads", c.threads, "", "threads of the alignment; the result is the same for any number",
-            {1, 64});
+  table.add("threads", c.threads, "",
+            "threads: from two on, one chooses the points; the result is the same for any number", {1, 64});
   table.group("events", c.events);
   table.group("visible", c.visible);
   table.add("field", c.field, {{"events", FieldKind::events}, {"exponential", FieldKind::exponential}},
@@ -97,7 +97,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       clock_(std::move(clock)),
       pool_(config.threads),
       index_(*setup_.map),
-      visible_(index_, *setup_.camera, spread(config)),
+      visible_(index_, *setup_.camera, spread(config), config.threads > 1),
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
       capture_(config.capture, index_, pieces_, *setup_.camera, setup_.T_body_cam,
@@ -116,6 +116,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   if (config.capture.on && sigma_px() > config.capture.from_px)
     capture_.begin(start.t, fusion_->state().nav, fusion_->state().pose_covariance());
   next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
+  visible_.choose(start.T_map_body * setup_.T_body_cam);  // the dearest one, before the data come
 }
 
 void Tracker::add_imu(const ImuSample& sample) {

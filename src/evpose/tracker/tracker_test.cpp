@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole tracker in a world of boxes of glass, whose edges make exact events: what it says when the input
+// is bad.
+#include "evpose/tracker/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+#include <numbers>
+#include <random>
+
+namespace {
+std::atomic<std::int64_t> allocations{0};
+}  // namespace
+
+// NOLINTBEGIN(cppcoreguidelines-no-malloc,misc-new-delete-overloads): this is what they are counted with.
+namespace {
+void* counted(std::size_t alignment, std::size_t size) {
+  ++allocations;
+  if (void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment)) return p;
+  throw std::bad_alloc();
+}
+}  // namespace
+void* operator new(std::size_t size) { return counted(alignof(std::max_align_t), size); }
+void* operator new(std::size_t size, std::align_val_t a) {
+  return counted(static_cast<std::size_t>(a), size);
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+// NOLINTEND(cppcoreguidelines-no-malloc,misc-new-delete-overloads)
+
+namespace evpose {
+namespace {
+
+constexpr double kSpacing_m = 0.02;
+constexpr TimeNs kStart_ns = kNsPerMs;
+
+/// The camera's motion: smooth, with enough of each of its six components.
+Pose pose_at(double t) {
+  return {
+      so3::exp(Eigen::Vector3d(0.06 * std::sin(1.7 * t), 0.10 * std::sin(2.1 * t + 0.5),
+                               0.08 * std::sin(1.3 * t))),
+      {0.8 + 0.20 * std::sin(1.9 * t), 3 + 0.25 * std::sin(1.5 * t + 0.4), 1.5 + 0.12 * std::sin(2.3 * t)}};
+}
+
+/// Camera axes in the body's: z along the body's x.
+Pose camera_on_body() {
+  Eigen::Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {Eigen::Quaterniond(R), {0.03, 0.01, -0.02}};
+}
+
+void add_edge(ContourMap& map, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const Eigen::Vector3d t = (b - a).normalized();
+  const auto contour = map.points.empty() ? 0 : map.points.back().contour + 1;
+  for (double s = 0; s < (b - a).norm(); s += kSpacing_m) {
+    ContourPoint p;
+    p.position = (a + s * t).cast<float>();
+    p.tangent = t.cast<float>();
+    p.normal = t.unitOrthogonal().cast<float>();
+    p.length = static_cast<float>(kSpacing_m);
+    p.contour = contour;
+    map.points.push_back(p);
+  }
+}
+
+ContourMap boxes() {
+  ContourMap map;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 14; ++i) {
+    const Eigen::Vector3d low(3 + 2 * u(random), 1 + 3.4 * u(random), 0.2 + 2 * u(random));
+    const Eigen::Vector3d high =
+        low + Eigen::Vector3d(0.2 + 0.5 * u(random), 0.2 + 0.6 * u(random), 0.2 + 0.6 * u(random));
+    const auto corner = [&](int k) {
+      return Eigen::Vector3d((k & 1) ? high.x() : low.x(), (k & 2) ? high.y() : low.y(),
+                             (k & 4) ? high.z() : low.z());
+    };
+    for (int k = 0; k < 8; ++k)
+      for (const int bit : {1, 2, 4})
+        if (!(k & bit)) add_edge(map, corner(k), corner(k | bit));
+  }
+  return map;
+}
+
+/// Some parallel lines far longer than the view.
+ContourMap parallel_lines() {
+  ContourMap map;
+  for (int i = 0; i < 6; ++i)
+    add_edge(map, {3 + 0.4 * i, -4, 0.6 + 0.3 * i}, {3 + 0.4 * i, 10, 0.6 + 0.3 * i});
+  return map;
+}
+
+class BadInput : public ::testing::Test {
+ protected:
+  BadInput() {
+    setup_.camera =
+        std::move(make_camera({300, 300, 159.5, 119.5, "radtan", {-0.05, 0.01, 0, 0}, {320, 240}})).value();
+    setup_.T_body_cam = camera_on_body();
+    setup_.imu_noise.rate_hz = 1000;
+  }
+
+  /// Tracks what a camera sees of `world` with the map and camera of setup_ for so long; no events within the
+  /// silence.
+  void fly(const ContourMap& world, double seconds, double silent_from = 1e9, double silent_to = 1e9) {
+    const Camera& camera = world_camera_ ? *world_camera_ : *setup_.camera;
+    StartState start;
+    start.t = kStart_ns;
+    start.T_map_body = pose_at(0);
+    constexpr double h = 1e-4;
+    start.velocity = (pose_at(h).p - pose_at(-h).p) / (2 * h);
+    tracker_ = std::move(Tracker::create(setup_, config_, start)).value();
+    tracker_->on_update([this](const Update& u) {
+      updates_.push_back(u);
+      if (!u.reason.empty()) reasons_.push_back(std::string(to_string(u.health)) + ": " + u.reason);
+    });
+    updates_.reserve(10000);
+    std::vector<std::optional<Eigen::Vector2d>> before(world.points.size());
+    constexpr int kStepsPerPacket = 4;
+    constexpr double kStep_s = 2.5e-4;
+    std::vector<std::pair<double, Event>> events;
+    for (int i = 0; kStep_s * i < seconds; ++i) {
+      const double t = kStep_s * i;
+      const Pose T_cam_map = (pose_at(t) * camera_on_body()).inverse();
+      const bool silent = t >= silent_from && t < silent_to;
+      for (std::size_t k = 0; k < world.points.size(); ++k) {
+        const Eigen::Vector3d x = T_cam_map * world.position(k);
+        Matrix23d J;
+        auto pixel = x.z() > 0.3 ? camera.project(x, &J) : std::nullopt;
+        if (pixel && !camera.size().contains(*pixel)) pixel.reset();
+        if (pixel && before[k] && !silent) {
+          // An event when the edge reaches the middle of a pixel, along the axis that it runs across.
+          const Eigen::Vector2d along = J * (T_cam_map.q * world.points[k].tangent.cast<double>());
+          const int axis = std::abs(along.x()) > std::abs(along.y()) ? 1 : 0;
+          const double a = (*before[k])[axis], b = (*pixel)[axis];
+          if (std::floor(a) != std::floor(b)) {
+            const double line = std::max(std::floor(a), std::floor(b)), share = (line - a) / (b - a);
+            const Eigen::Vector2d at = *before[k] + share * (*pixel - *before[k]);
+            const bool rising = b > a;
+            events.emplace_back(
+                t - kStep_s + share * kStep_s,
+                make_event(0, static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())),
+                           rising == (world.points[k].contour % 2 == 0)));
+          }
+        }
+        before[k] = pixel;
+      }
+      if ((i + 1) % kStepsPerPacket != 0) continue;
+      tracker_->add_imu(imu_at(t));
+      std::sort(events.begin(), events.end(), [](const auto& p, const auto& q) { return p.first < q.first; });
+      EventPacket packet;
+      packet.base = kStart_ns + from_seconds(t - kStepsPerPacket * kStep_s);
+      for (const auto& [when, event] : events) {
+        packet.events.push_back(event);
+        packet.events.back().dt_us = static_cast<std::uint32_t>(
+            std::max<TimeNs>(0, (kStart_ns + from_seconds(when) - packet.base) / kNsPerUs));
+      }
+      events.clear();
+      const std::int64_t already = allocations;
+      const std::size_t done = updates_.size();
+      if (!packet.empty()) tracker_->add_events(packet);
+      tracker_->events_complete_until(kStart_ns + from_seconds(t));
+      if (updates_.size() == done + 1) allocated_.push_back(allocations - already);
+    }
+  }
+
+  static ImuSample imu_at(double t) {
+    constexpr double h = 1e-4;
+    const Pose a = pose_at(t - h), b = pose_at(t), c = pose_at(t + h);
+    const Eigen::Vector3d acceleration = (a.p - 2 * b.p + c.p) / (h * h);
+    return {kStart_ns + from_seconds(t), so3::log(a.q.conjugate() * c.q) / (2 * h),
+            b.q.conjugate() * (acceleration + Eigen::Vector3d(0, 0, 9.81))};
+  }
+  static double error_m(const Update& u) {
+    return (u.T_map_body.p - pose_at(to_seconds(u.t - kStart_ns)).p).norm();
+  }
+  static double sigma_m(const Update& u) { return std::sqrt(u.covariance.topLeftCorner<3, 3>().trace()); }
+  const Update& at(double t) const {
+    return updates_[std::min(updates_.size() - 1, static_cast<std::size_t>(t * config_.rate_hz))];
+  }
+  bool said(const std::string& words) const {
+    return std::any_of(reasons_.begin(), reasons_.end(),
+                       [&](const std::string& r) { return r.find(words) != std::string::npos; });
+  }
+  std::string all_reasons() const {
+    std::string out;
+    for (const auto& r : reasons_) out += r + "\n";
+    return out;
+  }
+
+  TrackerSetup setup_;
+  TrackerConfig config_;
+  std::shared_ptr<const Camera> world_camera_;  ///< if it differs from what the tracker believes
+  std::unique_ptr<Tracker> tracker_;
+  std::vector<Update> updates_;
+  std::vector<std::string> reasons_;
+  std::vector<std::int64_t> allocated_;  ///< per update
+};
+
+TEST_F(BadInput, GoodInputIsTrackedAndAllocatesNextToNothing) {
+  setup_.map = std::make_shared<const ContourMap>(boxes());
+  fly(*setup_.map, 1.2);
+  EXPECT_EQ(updates_.back().health, Health::tracking) << all_reasons();
+  for (const double t : {0.4, 0.8, 1.1}) {
+    EXPECT_LT(error_m(at(t)), 4e-3) << t;
+    EXPECT_LT(error_m(at(t)), 4 * sigma_m(at(t))) << t;
+  }
+  // Nothing but a block of a queue now and then (deque), and what a larger choice of points needs.
+  std::int64_t sum = 0;
+  for (std::size_t i = allocated_.size() / 2; i < allocated_.size(); ++i) sum += allocated_[i];
+  EXPECT_LE(sum, static_cast<std::int64_t>(allocated_.size() / 4));
+}
+
+TEST_F(BadInput, SilenceOfTheEventsIsNamedAndTheCovarianceGrows) {
+  setup_.map = std::make_shared<const ContourMap>(boxes());
+  fly(*setup_.map, 2.6, 0.6, 2.4);
+  EXPECT_EQ(at(0.55).health, Health::tracking);
+  EXPECT_NE(at(0.8).health, Health::tracking);
+  EXPECT_TRUE(said("map points have events near by")) << all_reasons();
+  EXPECT_GT(sigma_m(at(1.2)), 2 * sigma_m(at(0.7)));
+  EXPECT_GT(sigma_m(at(2.3)), 2 * sigma_m(at(1.2)));
+  EXPECT_LT(error_m(at(2.3)), 4 * sigma_m(at(2.3)));
+}
+
+TEST_F(BadInput, NoVisiblePointIsNamed) {
+  ContourMap behind = boxes();
+  for (ContourPoint& p : behind.points) p.position.x() = -p.position.x();
+  setup_.map = std::make_shared<const ContourMap>(behind);
+  fly(boxes(), 1.0);
+  EXPECT_NE(updates_.back().health, Health::tracking);
+  EXPECT_EQ(updates_.back().points, 0);
+  EXPECT_GT(sigma_m(at(0.9)), 2 * sigma_m(at(0.3)));
+}
+
+TEST_F(BadInput, ParallelLinesLeaveTheirDirectionOpen) {
+  setup_.map = std::make_shared<const ContourMap>(parallel_lines());
+  fly(*setup_.map, 2.0);
+  const Matrix6d c = updates_.back().covariance;
+  EXPECT_GT(c(1, 1), 20 * c(0, 0));
+  EXPECT_GT(c(1, 1), 20 * c(2, 2));
+  EXPECT_NE(updates_.back().health, Health::tracking);
+  EXPECT_TRUE(said("pose uncertain by")) << all_reasons();
+  EXPECT_LT(error_m(updates_.back()), 5 * sigma_m(updates_.back()));
+}
+
+// So few and clean edges can follow the wrong ones for a while; the pose is not called a good one.
+TEST_F(BadInput, AMirroredMapIsNoticed) {
+  ContourMap mirrored = boxes();
+  for (ContourPoint& p : mirrored.points) p.position.y() = 6 - p.position.y();
+  setup_.map = std::make_shared<const ContourMap>(mirrored);
+  fly(boxes(), 1.0);
+  EXPECT_TRUE(said("events do not gather at the contours")) << all_reasons();
+  EXPECT_GT(sigma_m(updates_.back()), 3 * sigma_m(at(0.05)));
+  for (const Update& u : updates_) EXPECT_TRUE(u.health != Health::tracking || error_m(u) < 5 * sigma_m(u));
+}
+
+TEST_F(BadInput, AFocalLengthThatIsWrongByATwentiethIsNotAGoodPose) {
+  world_camera_ =
+      std::move(make_camera({315, 315, 159.5, 119.5, "radtan", {-0.05, 0.01, 0, 0}, {320, 240}})).value();
+  setup_.map = std::make_shared<const ContourMap>(boxes());
+  fly(*setup_.map, 1.5);
+  for (const double t : {0.5, 1.0, 1.4})
+    EXPECT_TRUE(at(t).health != Health::tracking || error_m(at(t)) < 5 * sigma_m(at(t)))
+        << t << ' ' << error_m(at(t)) << ' ' << sigma_m(at(t)) << '\n'
+        << all_reasons();
+}
+
+}  // namespace
+}  // namespace evpose

@@ -12,11 +12,16 @@
 namespace evpose {
 namespace {
 
-constexpr std::size_t kNeighbours = 12;
-constexpr float kLikeNormal = 0.9F;    // cosine
-constexpr float kAside = 0.3F;         // of the distance: what still counts as along the contour
-constexpr float kSamePlace = 1e-6F;    // m
-constexpr float kReaches[] = {5, 20};  // in spacings; the second where points are sparser than usual
+constexpr float kLikeNormal = 0.9F;  // cosine
+constexpr float kAside = 0.3F;       // of the distance: what still counts as along the contour
+constexpr float kSamePlace = 1e-6F;  // m
+/// In spacings, and how many points within it are looked at. The second: where points are sparser than usual;
+/// the third: where contours are bands of points, merged from many frames.
+struct Reach {
+  float spacings;
+  std::size_t neighbours;
+};
+constexpr Reach kReaches[] = {{5, 12}, {20, 12}, {50, 160}};
 
 struct Neighbour {
   float distance;
@@ -36,8 +41,12 @@ bool akin(const ContourPoint& a, const ContourPoint& b) {
 
 class Neighbourhood {
  public:
-  Neighbourhood(const ContourMap& map, const std::vector<Eigen::Vector3f>& positions, float reach)
-      : map_(map), grid_(positions, reach), reach_(reach) {}
+  Neighbourhood(const ContourMap& map, const std::vector<Eigen::Vector3f>& positions, const Reach& reach,
+                float spacing)
+      : map_(map),
+        grid_(positions, reach.spacings * spacing),
+        reach_(reach.spacings * spacing),
+        most_(reach.neighbours) {}
 
   /// The nearest akin points, not at the same place.
   const std::vector<Neighbour>& of(std::size_t i) {
@@ -47,7 +56,7 @@ class Neighbourhood {
       const float d = (map_.points[j].position - p.position).norm();
       if (d > kSamePlace && d <= reach_ && akin(p, map_.points[j])) found_.push_back({d, j});
     });
-    const std::size_t count = std::min(kNeighbours, found_.size());
+    const std::size_t count = std::min(most_, found_.size());
     std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(count), found_.end());
     found_.resize(count);
     return found_;
@@ -57,6 +66,7 @@ class Neighbourhood {
   const ContourMap& map_;
   PointGrid grid_;
   float reach_;
+  std::size_t most_;
   std::vector<Neighbour> found_;
 };
 
@@ -142,9 +152,9 @@ std::size_t fill_tangents(ContourMap& map, const std::vector<Eigen::Vector3f>& p
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < map.points.size(); ++i)
     if (map.points[i].tangent.isZero()) missing.push_back(i);
-  for (const float reach : kReaches) {
+  for (const Reach& reach : kReaches) {
     if (missing.empty() || spacing <= 0) break;
-    Neighbourhood neighbourhood(map, positions, reach * spacing);
+    Neighbourhood neighbourhood(map, positions, reach, spacing);
     std::erase_if(missing, [&](std::size_t i) {
       map.points[i].tangent = estimate_tangent(map, i, neighbourhood.of(i));
       return !map.points[i].tangent.isZero();
@@ -157,9 +167,9 @@ void fill_lengths(ContourMap& map, const std::vector<Eigen::Vector3f>& positions
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < map.points.size(); ++i)
     if (map.points[i].length == 0 && !map.points[i].tangent.isZero()) missing.push_back(i);
-  for (const float reach : kReaches) {
+  for (const Reach& reach : kReaches) {
     if (missing.empty() || spacing <= 0) break;
-    Neighbourhood neighbourhood(map, positions, reach * spacing);
+    Neighbourhood neighbourhood(map, positions, reach, spacing);
     std::erase_if(missing, [&](std::size_t i) {
       map.points[i].length = estimate_length(map, i, neighbourhood.of(i));
       return map.points[i].length > 0;

@@ -53,6 +53,18 @@ Status check_finite(const PointTable& table, const std::string& path) {
   return {};
 }
 
+/// Second points told in a frame that is turned by half about x, as in clouds released with EVIT; seen by
+/// their lying beside x y z once they are turned back.
+bool half_turned(const VectorColumns& position, const VectorColumns& gradient, std::size_t rows) {
+  constexpr double kBeside_m = 0.5;
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const Eigen::Vector3d g = gradient.at(i);
+    near += (position.at(i) - Eigen::Vector3d(g.x(), -g.y(), -g.z())).norm() < kBeside_m ? 1 : 0;
+  }
+  return static_cast<double>(near) > 0.95 * static_cast<double>(rows);
+}
+
 /// A direction perpendicular to the contour from the columns xg yg zg, one for each point (zero where
 /// unknown).
 Expected<std::vector<Eigen::Vector3d>> from_gradient(const VectorColumns& position,
@@ -64,6 +76,12 @@ Expected<std::vector<Eigen::Vector3d>> from_gradient(const VectorColumns& positi
     distance[i] = (position.at(i) - gradient.at(i)).norm();
     near += distance[i] < 0.5 ? 1 : 0;
     unit += std::abs(gradient.at(i).norm() - 1) < 0.01 ? 1 : 0;
+  }
+  const bool turned =
+      kind == GradientColumns::automatic && half_turned(position, gradient, rows) && 2 * near < rows;
+  if (turned) {
+    log_warning(path + ": xg yg zg are points in a frame turned by half about x; turned back");
+    kind = GradientColumns::point;
   }
   if (kind == GradientColumns::automatic) {
     const double share_near = static_cast<double>(near) / static_cast<double>(rows);
@@ -85,8 +103,10 @@ Expected<std::vector<Eigen::Vector3d>> from_gradient(const VectorColumns& positi
   }
   std::vector<Eigen::Vector3d> normals(rows, Eigen::Vector3d::Zero());
   for (std::size_t i = 0; i < rows; ++i) {
+    Eigen::Vector3d second = gradient.at(i);
+    if (turned) second.tail<2>() *= -1;
     const Eigen::Vector3d g =
-        kind == GradientColumns::point ? Eigen::Vector3d(position.at(i) - gradient.at(i)) : gradient.at(i);
+        kind == GradientColumns::point ? Eigen::Vector3d(position.at(i) - second) : second;
     const double norm = g.norm();
     const bool usable = norm > 1e-9 && (kind == GradientColumns::direction || norm < 0.5);
     if (usable) normals[i] = g / norm;

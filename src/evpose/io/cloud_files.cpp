@@ -86,7 +86,7 @@ Expected<PointCloud> read_cloud(const std::string& path) {
   if (extent > kLargest_m)
     log_warning(
         text(path, ": ", extent, " m across: are these centimetres or millimetres? Metres are expected"));
-  if (extent < kSmallest_m)
+  if (extent > 0 && extent < kSmallest_m)
     log_warning(text(path, ": only ", extent, " m across: are these kilometres? Metres are expected"));
   PointCloud cloud;
   cloud.source = path;

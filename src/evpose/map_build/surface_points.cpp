@@ -64,7 +64,7 @@ double median(std::vector<double>& values) {
 Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, const PatchConfig& config,
                                    const std::string& where) {
   if (points.size() < kFewest)
-    return Error{where, text("only ", points.size(), " points"), "give a cloud of surfaces"};
+    return Error{where, text("only ", points.size(), " different points"), "give a cloud of surfaces"};
   // The neighbours of a part of the points would lie further apart: the tree holds all.
   const Neighbours tree(points);
   const std::size_t patch = std::min<std::size_t>(kLargestSamplePatch, points.size());

@@ -4,8 +4,8 @@
 
     map_accuracy.py EVPOSE SHARED OUT.md     some minutes
 
-Builds maps from the peer's clouds and holds them to the true contours; tracks the peer's recordings with the true
-contours and with the built maps; builds maps of the real clouds.
+Builds maps from the peer's clouds and from simulated LiDAR flights and holds them to the true contours; tracks the
+recordings in the same worlds with the true contours and with the built maps; builds maps of the real clouds.
 """
 import json
 import pathlib
@@ -14,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 
-SCENES = {"room": ["room_spiral", "room_hover"], "courtyard": ["courtyard_landing"]}
+PEER = {"room": ["room_spiral", "room_hover"], "courtyard": ["courtyard_landing"]}
+SIMULATED, SIMULATED_S = ["indoor_spiral", "outdoor_spiral"], 1.5
 REAL = ["hall_lidar_4cm", "campus_building_livox", "street_lidar_scan", "room_laser_scan", "office_rgbd"]
 
 
@@ -33,30 +34,49 @@ def track(evpose, recording, contours, scratch, *extra):
             f"{a['are_mean_deg']:.3f} | {a['nees6_mean']:.2f}")
 
 
+def scene_of(name, cloud, contours, mesh, recordings):
+    return {"name": name, "cloud": cloud, "contours": contours, "mesh": mesh, "recordings": recordings}
+
+
+def peer_scenes(shared):
+    maps = shared / "data/peer/maps"
+    return [scene_of(name, maps / f"{name}_map_raw.ply", maps / f"{name}_contours.ply", maps / f"{name}_mesh.ply",
+                     [shared / "data/peer" / recording for recording in recordings])
+            for name, recordings in PEER.items()]
+
+
+def simulated_scenes(evpose, scratch):
+    scenes = []
+    for name in SIMULATED:
+        folder = scratch / name
+        run(evpose, "-q", "simulate", name, "-o", folder, "--duration", SIMULATED_S, "--set", "lidar.on=true")
+        scenes.append(scene_of(f"{name} (simulated)", folder / "map_raw.ply", folder / "contours.ply",
+                               folder / "mesh.ply", [folder]))
+    return scenes
+
+
 def main():
     if len(sys.argv) != 4:
         sys.exit(__doc__)
     evpose, shared, out = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
-    maps = shared / "data/peer/maps"
     lines = ["Made by `scripts/map_accuracy.py`; do not edit.", ""]
+    tracking = ["### Tracking", "",
+                "| recording | map | status | coverage | ATE mean mm | p95 mm | ARE mean deg | NEES/6 |",
+                "|---|---|---|---|---|---|---|---|"]
     with tempfile.TemporaryDirectory() as name:
         scratch = pathlib.Path(name)
-        for scene in SCENES:
-            cloud, built = maps / f"{scene}_map_raw.ply", scratch / f"{scene}.h5"
-            figures = run(evpose, "map", "build", cloud, "-o", built)
-            score = run(evpose, "-q", "map", "compare", built, maps / f"{scene}_contours.ply", "--cloud", cloud)
-            lines += [f"### {scene}: cloud to map", "", "```", *figures.splitlines(), "", *score.splitlines(), "```", ""]
-        lines += ["### Tracking", "", "| recording | map | status | coverage | ATE mean mm | p95 mm | ARE mean deg | NEES/6 |",
-                  "|---|---|---|---|---|---|---|---|"]
-        for scene, recording in ((scene, one) for scene, all_of_it in SCENES.items() for one in all_of_it):
-            folder = shared / "data/peer" / recording
-            true, mesh = maps / f"{scene}_contours.ply", maps / f"{scene}_mesh.ply"
-            lines.append(f"| {recording} | true | {track(evpose, folder, true, scratch, '--occluders', mesh)} |")
-            built = scratch / f"{scene}.h5"
-            lines.append(f"| {recording} | built | {track(evpose, folder, built, scratch)} |")
-            lines.append(f"| {recording} | built, true occluders | "
-                         f"{track(evpose, folder, built, scratch, '--occluders', mesh)} |")
-        lines.append("")
+        for scene in peer_scenes(shared) + simulated_scenes(evpose, scratch):
+            built = scratch / "built.h5"
+            figures = run(evpose, "map", "build", scene["cloud"], "-o", built)
+            score = run(evpose, "-q", "map", "compare", built, scene["contours"], "--cloud", scene["cloud"])
+            lines += [f"### {scene['name']}: cloud to map", "", "```", *figures.splitlines(), "", *score.splitlines(),
+                      "```", ""]
+            for folder in scene["recordings"]:
+                occluders = ["--occluders", scene["mesh"]]
+                for kind, contours, more in (("true", scene["contours"], occluders), ("built", built, []),
+                                             ("built, true occluders", built, occluders)):
+                    tracking.append(f"| {folder.name} | {kind} | {track(evpose, folder, contours, scratch, *more)} |")
+        lines += [*tracking, ""]
         for cloud in REAL:
             before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
             figures = run(evpose, "-q", "map", "build", shared / f"data/real/clouds/{cloud}.ply", "-o", scratch / "real.h5")

@@ -1,14 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time and memory of map building against the size of the cloud.
+"""Time and memory of map building against the size of the cloud, and the first steps by PCL beside it.
 
-    map_scale.py EVPOSE SHARED [MILLIONS...]     default 0.1 1 10; 50 takes the better part of an hour
+    map_scale.py EVPOSE SHARED [--threads N] [--pcl MILLIONS] [MILLIONS...]     default 0.1 1 10; 50 takes half an hour
 
 Clouds are the shared hall (1.2 million points, 30 x 40 m), cut to size or repeated side by side in a square.
-Prints a table.
+Prints two tables. PCL's (libpcl-dev, pkg-config and a compiler; left out by name without them) does normals and
+region growing for clouds of up to --pcl million points, with as many neighbours and threads as ours.
 """
+import argparse
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -53,26 +57,65 @@ def write_repeated(path, points, count):
                 break
 
 
+def measured(command):
+    """Output, processor seconds, elapsed seconds and peak bytes of a command."""
+    start = time.monotonic()
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen([str(word) for word in command], stdout=output)
+        _, status, usage = os.wait4(process.pid, 0)
+        elapsed = time.monotonic() - start
+        if status != 0:
+            sys.exit(f"{command[0]} failed")
+        output.seek(0)
+        return output.read(), usage.ru_utime + usage.ru_stime, elapsed, usage.ru_maxrss * 1024
+
+
+def compiled_peer(folder):
+    """The program of PCL's steps; None, and why, where it cannot be made."""
+    modules = ["pcl_features", "pcl_segmentation", "pcl_io", "pcl_search"]
+    if not shutil.which("pkg-config") or subprocess.run(["pkg-config", "--exists", *modules]).returncode != 0:
+        print("PCL is not there (libpcl-dev); its table is left out")
+        return None
+    flags = subprocess.run(["pkg-config", "--cflags", "--libs", *modules], capture_output=True, text=True).stdout.split()
+    source = pathlib.Path(__file__).with_name("pcl_planes.cpp")
+    subprocess.run(["c++", "-std=c++17", "-O3", "-march=x86-64-v3", "-fopenmp", source, "-o", folder / "pcl", *flags],
+                   check=True)
+    return folder / "pcl"
+
+
 def main():
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    evpose, shared = sys.argv[1], pathlib.Path(sys.argv[2])
-    millions = [float(word) for word in sys.argv[3:]] or [0.1, 1, 10]
-    points = hall(shared / "data/real/clouds/hall_lidar_4cm.ply")
-    print("| points | processor s | s per million | elapsed s | peak memory MB | bytes per point |\n|---|---|---|---|---|---|")
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("evpose")
+    parser.add_argument("shared", type=pathlib.Path)
+    parser.add_argument("millions", type=float, nargs="*", default=[0.1, 1, 10])
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--pcl", type=float, default=1)
+    wanted = parser.parse_args()
+    points = hall(wanted.shared / "data/real/clouds/hall_lidar_4cm.ply")
+    print("| points | tiles | processor s | s per million | elapsed s | peak memory MB | bytes per point |")
+    print("|---|---|---|---|---|---|---|")
+    beside = []
     with tempfile.TemporaryDirectory() as name:
-        cloud, built = pathlib.Path(name) / "cloud.ply", pathlib.Path(name) / "map.h5"
-        for million in millions:
+        folder = pathlib.Path(name)
+        cloud, built = folder / "cloud.ply", folder / "map.h5"
+        peer = compiled_peer(folder) if wanted.pcl > 0 else None
+        for million in wanted.millions:
             count = int(million * 1e6)
             write_repeated(cloud, points, count)
-            start = time.monotonic()
-            process = subprocess.Popen([evpose, "-q", "map", "build", cloud, "-o", built], stdout=subprocess.DEVNULL)
-            _, status, usage = os.wait4(process.pid, 0)
-            if status != 0:
-                sys.exit(f"map build failed at {count} points")
-            spent = usage.ru_utime + usage.ru_stime
-            print(f"| {count} | {spent:.1f} | {spent / million:.1f} | {time.monotonic() - start:.1f} | "
-                  f"{usage.ru_maxrss / 1024:.0f} | {usage.ru_maxrss * 1024 / count:.0f} |", flush=True)
+            said, spent, elapsed, peak = measured(
+                [wanted.evpose, "-q", "map", "build", cloud, "-o", built, "--threads", wanted.threads])
+            figures = re.search(r"patches of (\d+)(?:, (\d+) tiles)?\n.*normals ([\d.]+), planes ([\d.]+)", said, re.S)
+            print(f"| {count} | {figures[2] or 1} | {spent:.1f} | {spent / million:.1f} | {elapsed:.1f} | "
+                  f"{peak / 1e6:.0f} | {peak / count:.0f} |", flush=True)
+            if peer and million <= wanted.pcl:
+                of_peer, _, _, peer_peak = measured([peer, cloud, figures[1], wanted.threads])
+                _, normals, growing, regions, share = of_peer.split()
+                beside.append(f"| {count} | {figures[1]} | {figures[3]} | {figures[4]} | {peak / 1e6:.0f} | {normals} | "
+                              f"{growing} | {peer_peak / 1e6:.0f} | {regions}, {100 * float(share):.0f} % |")
+    if beside:
+        print("\n| points | neighbours | ours: normals s | planes s | peak MB, whole build | PCL: normals s | regions s | "
+              "peak MB | regions, share of the points |\n|---|---|---|---|---|---|---|---|---|")
+        print("\n".join(beside))
 
 
 if __name__ == "__main__":

@@ -53,13 +53,14 @@ int build(const BuildRequest& request) {
   const auto& f = built->figures;
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::printf(
-      "points     %zu, %.1f cm apart, noise %.1f mm, patches of %d\n"
+      "points     %zu, %.1f cm apart, noise %.1f mm, patches of %d%s\n"
       "planes     %zu hold %.1f %% of the points; %zu are facets of curved surfaces\n"
       "creases    %.1f m\nboundaries %.1f m; %.1f m of outlines left out: soft, short or unsure\n"
-      "time       %.1f s\n",
-      f.points, 100 * f.scale.spacing_m, 1e3 * f.scale.noise_m, f.scale.neighbours, f.planes,
+      "time       %.1f s; normals %.2f, planes %.2f\n",
+      f.points, 100 * f.scale.spacing_m, 1e3 * f.scale.noise_m, f.scale.neighbours,
+      f.tiles > 1 ? text(", ", f.tiles, " tiles").c_str() : "", f.planes,
       100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved, f.crease_m,
-      f.boundary_m, f.shadow_m, wall_s);
+      f.boundary_m, f.shadow_m, wall_s, f.normals_s, f.planes_s);
   if (!up.known)
     std::printf("up         unknown: neither a floor nor walls of two directions%s\n",
                 request.level ? "; not levelled" : "");

@@ -4,32 +4,44 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
+#include "evpose/map_build/section_fit.h"
 #include "evpose/map_build/strips.h"
 
 namespace evpose::map_build {
 namespace {
 
 constexpr double kMovedByBlur = 0.3;
-constexpr double kWindow = 2.5;        // noise: half width of what is taken for one surface
-constexpr double kReachNoise = 4;      // noise: of what is looked at around an edge
-constexpr double kMixed = 1.5;         // noise: nearer to the plane points may be of either face
-constexpr double kBand_m = 0.03;       // height of the band in which a second face is looked for, at least
-constexpr double kBandSpacings = 2;    // ... and in spacings
-constexpr double kFewestHanging = 8;   // points of a second face
-constexpr double kLeastHanging = 0.3;  // ... and its density, as a share of the plane's
-constexpr double kMostBeside = 0.4;    // points beside the second face, as a share of its own
-constexpr double kAgree = 2.5;         // sigma: two estimates of one edge
-constexpr double kAgreeBlur = 0.5;     // ... and blur of the softer one
-constexpr double kHigh = 1.2;          // noise: few of the plane's points are further from it
-constexpr double kDenser = 1.5;        // ... and over the plane's density
-constexpr double kExcess = 3;          // sigma: of points at the edge over chance
+constexpr double kWindow = 2.5;           // noise: half width of what is taken for one surface
+constexpr double kReachNoise = 4;         // noise: of what is looked at around an edge
+constexpr double kBand_m = 0.03;          // height of the band in which a second face is looked for, at least
+constexpr double kBandSpacings = 2;       // ... and in spacings
+constexpr double kFewestHanging = 8;      // points of a second face
+constexpr double kLeastHanging = 0.3;     // ... and its density, as a share of the plane's
+constexpr double kMostUnexplained = 0.1;  // share of the points at an edge that no surface there explains
+constexpr double kMostDepthSigma = 0.3;   // noise: of the far edge of a narrow face
+constexpr double kLeastDepth = 1.5;       // noise: of a face whose edges are told apart ...
+constexpr double kMostDepth = 3.5;        // ... and of one too narrow for a plane of its own
+constexpr double kLeastGain = 10;         // of log likelihood, by a second face
+constexpr double kOffPlane = 0.4;         // noise: so far a plane may lie off its surface at an edge
+constexpr double kHigh = 1.2;             // noise: few of the plane's points are further from it
+constexpr double kDenser = 1.5;           // ... and over the plane's density
+constexpr double kExcess = 3;             // sigma: of points at the edge over chance
 constexpr std::size_t kMostPoints = 1200;  // for one edge
 constexpr double kUneven = 0.1;            // noise: that many points do not average away
 constexpr double kMostRest = 0.12;         // density beyond a free edge, as a share of that within
-constexpr double kMostRestHanging = 0.35;  // ... beyond an edge with a second face
 
 double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane);
+
+/// Keeps every so manieth point.
+void thin_out(std::vector<Eigen::Vector3d>& points, std::size_t most) {
+  if (points.size() <= most) return;
+  const std::size_t step = points.size() / most + 1;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < points.size(); k += step) points[kept++] = points[k];
+  points.resize(kept);
+}
 
 class BoundaryFinder {
  public:
@@ -51,22 +63,29 @@ class BoundaryFinder {
   struct Edge {
     Eigen::Vector2d middle, along, out;  ///< in the plane's frame
     double half_length;
+    /// Outwards, and turned by a slope; the surface is on the left.
+    void shift(double place, double slope) {
+      middle += place * out;
+      along = (along + slope * out).normalized();
+      out = {along.y(), -along.x()};
+    }
   };
   std::vector<Eigen::Vector3d> local_points(const Edge& edge, double reach) const;
   struct OwnPoints {
     std::vector<Eigen::Vector3d> points;  ///< along, outwards, over the plane
     bool one_side = false;                ///< only those on one side of the plane
-    double share = 1;                     ///< of them that was kept
   };
   OwnPoints own_points(const std::vector<Eigen::Vector3d>& local, double half_width) const;
   static StepFit likeliest(const std::vector<Eigen::Vector3d>& points, double half_length, double half_width,
                            double shear, std::span<const double> blurs);
-  bool hanging(const std::vector<Eigen::Vector3d>& local, double length, double density, int side,
-               double& place, double& sigma) const;
+  std::optional<SectionFit> second_face(const Edge& edge) const;
   bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
   bool goes_on(const Piece& piece) const;
   bool covered(const Piece& piece) const;
-  bool fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const;
+  StepFit settle(Edge& edge) const;
+  std::optional<Piece> far_edge(const Piece& near, const SectionFit& section) const;
+  void fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::int32_t number,
+           std::vector<Piece>& out) const;
 
   const SurfacePoints& surface_;
   const Neighbours& tree_;
@@ -192,13 +211,7 @@ BoundaryFinder::OwnPoints BoundaryFinder::own_points(const std::vector<Eigen::Ve
     out.points = std::move(half[1 - fuller]);
     out.one_side = true;
   }
-  if (out.points.size() > kMostPoints) {
-    const std::size_t step = out.points.size() / kMostPoints + 1;
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < out.points.size(); k += step) out.points[kept++] = out.points[k];
-    out.points.resize(kept);
-    out.share = 1.0 / static_cast<double>(step);
-  }
+  thin_out(out.points, kMostPoints);
   return out;
 }
 
@@ -218,107 +231,118 @@ StepFit BoundaryFinder::likeliest(const std::vector<Eigen::Vector3d>& points, do
   return best;
 }
 
-/// The face that begins at the edge on one side of the plane, +1 or -1: where it stands across the edge.
-bool BoundaryFinder::hanging(const std::vector<Eigen::Vector3d>& local, double length, double density,
-                             int side, double& place, double& sigma) const {
+/// The second face that begins at the edge, and where that puts it; `side` is 0 if there is none. Nothing if
+/// there is something that is no face, or more than faces: what ends where is open.
+std::optional<SectionFit> BoundaryFinder::second_face(const Edge& edge) const {
   const double noise = surface_.scale.noise_m;
-  const double low = kMixed * noise, high = low + std::max(kBand_m, kBandSpacings * plane_.spacing_m);
-  const double window = kWindow * noise;
-  double mean = 0, count = 0, squares = 0, beside = 0;
-  for (int round = 0; round < 8; ++round) {
-    double sum = 0;
-    count = squares = beside = 0;
-    for (const auto& p : local) {
-      const double height = side * p.z(), d = p.y() - mean;
-      if (height < low || height > high) continue;
-      if (std::abs(d) <= window)
-        sum += p.y(), squares += d * d, count += 1;
-      else if (std::abs(d) <= 2 * window)
-        beside += 1;
-    }
-    if (count == 0) return false;
-    mean = sum / count;
-  }
-  if (count < kFewestHanging || count < kLeastHanging * density * length * (high - low)) return false;
-  if (beside > kMostBeside * count || std::abs(mean) > window) return false;
-  place = mean;
-  sigma = std::hypot(std::sqrt(squares) / count, kUneven * noise);
-  return true;
+  SectionWindow window;
+  window.half_length = edge.half_length;
+  window.half_width = 3 * noise + kBand_m;
+  window.half_height = 3 * noise + std::max(kBand_m, kBandSpacings * plane_.spacing_m);
+  window.noise_m = noise;
+  window.height_noise_m = std::clamp(plane_.rms_m, 0.3 * noise, 1.5 * noise);
+  window.sigma_height_m = kOffPlane * noise;
+  std::vector<Eigen::Vector3d> points = local_points(edge, std::hypot(window.half_width, window.half_height));
+  std::erase_if(points, [&](const Eigen::Vector3d& p) {
+    return std::abs(p.y()) > window.half_width || std::abs(p.z()) > window.half_height;
+  });
+  thin_out(points, kMostPoints);
+  const SectionFit section = fit_section(points, window);
+  const bool likelier = section.side != 0 && section.gain >= kLeastGain;
+  const double on_face = section.face * 2 * edge.half_length * section.depth;
+  const bool dense = on_face >= kFewestHanging && section.face >= kLeastHanging * section.plane;
+  if (likelier && (!dense || section.rest_share > kMostUnexplained)) return {};
+  return likelier ? section : SectionFit{};
 }
 
-bool BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Piece& piece) const {
-  Edge edge;
-  edge.along = (b - a).normalized();
-  edge.out = {edge.along.y(), -edge.along.x()};  // the surface is on the left
-  edge.middle = 0.5 * (a + b);
-  edge.half_length = 0.5 * (b - a).norm();
+/// Moves the edge to where the plane's density falls off; not converged where that is too soft for an edge.
+StepFit BoundaryFinder::settle(Edge& edge) const {
   const double noise = surface_.scale.noise_m, half_width = 2.5 * outline_.cell_m;
   const double softest = std::max(noise, 0.3 * plane_.spacing_m);
   StepFit best;
-  double share = 1;
   for (int round = 0; round < 2; ++round) {
     const OwnPoints own =
         own_points(local_points(edge, std::hypot(half_width, kReachNoise * noise)), half_width);
-    share = own.share;
     // The softness of the edge: that which makes the points likeliest.
     const std::array<double, 5> blurs = {0.25 * softest, 0.5 * softest, softest, 2 * softest, 4 * softest};
     best = likeliest(own.points, edge.half_length, half_width, 0, blurs);
-    if (!best.converged) return false;
+    if (!best.converged) return best;
     if (round == 1 && !own.one_side)
       for (const double shear : {-1.0, -0.5, 0.5, 1.0}) {
         const std::array<double, 2> sharper = {best.blur_m, 0.6 * best.blur_m};
         const StepFit step = likeliest(own.points, edge.half_length, half_width, shear, sharper);
         if (step.converged && step.log_likelihood > best.log_likelihood) best = step;
       }
-    edge.middle += best.place * edge.out;
-    edge.along = (edge.along + best.slope * edge.out).normalized();
-    edge.out = {edge.along.y(), -edge.along.x()};
+    edge.shift(best.place, best.slope);
   }
-  if (best.blur_m > config_.most_blur_noise * softest) return false;
-  const std::vector<Eigen::Vector3d> local =
-      local_points(edge, kReachNoise * noise + std::max(kBand_m, kBandSpacings * plane_.spacing_m));
-  const double length = 2 * edge.half_length;
+  best.converged = best.blur_m <= config_.most_blur_noise * softest;
+  return best;
+}
+
+/// Of a second face too narrow for a plane of its own.
+std::optional<Piece> BoundaryFinder::far_edge(const Piece& near, const SectionFit& section) const {
+  const double noise = surface_.scale.noise_m;
+  if (section.side == 0 || !section.ends || section.sigma_depth > kMostDepthSigma * noise) return {};
+  if (section.depth < kLeastDepth * noise || section.depth > kMostDepth * noise) return {};
+  Piece far = near;
+  far.begin += section.side * section.depth * plane_.normal;
+  far.end += section.side * section.depth * plane_.normal;
+  far.normal_b = section.side * plane_.normal;
+  if (section.beyond > section.under) far.normal_a = -near.normal_a;
+  far.sigma_m = std::sqrt(near.sigma_m * near.sigma_m + section.sigma_depth * section.sigma_depth / 2);
+  return far;
+}
+
+void BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::int32_t number,
+                         std::vector<Piece>& out) const {
+  Edge edge{0.5 * (a + b), (b - a).normalized(), Eigen::Vector2d::Zero(), 0.5 * (b - a).norm()};
+  edge.shift(0, 0);
+  const double noise = surface_.scale.noise_m;
+  const StepFit best = settle(edge);
+  if (!best.converged) return;
   double across = std::hypot(best.sigma_place, 0.5 * edge.half_length * best.sigma_slope);
-  int side = 0;
-  for (const int s : {-1, 1}) {
-    double place = 0, sigma = 0;
-    if (side != 0 || !hanging(local, length, best.density / share, s, place, sigma)) continue;
-    // Where the plane ends the second face must begin.
-    if (std::abs(place) > kAgree * std::hypot(across, sigma) + kAgreeBlur * best.blur_m) return false;
-    side = s;
-    edge.middle += place * edge.out;
-    across = sigma;
+  double moved = kMovedByBlur * best.blur_m, height = 0;  // what blurs a free edge also moves it
+  const double uneven = std::max(kUneven * noise, plane_.uneven_m);
+  const std::optional<SectionFit> section = second_face(edge);
+  if (!section) return;
+  const int side = section->side;
+  if (side != 0) {
+    height = section->height;
+    across = std::hypot(section->sigma_place, uneven);
+    moved = std::hypot(section->sigma_height, uneven);
+    edge.shift(section->place, section->slope);
+  } else if (best.rest > kMostRest) {
+    return;
   }
-  if (best.rest > (side != 0 ? kMostRestHanging : kMostRest)) return false;
+  const auto lifted = [&](double t, double over) -> Eigen::Vector3d {
+    return frame_.lift(edge.middle + t * edge.half_length * edge.along) + over * plane_.normal;
+  };
+  Piece piece;
+  piece.plane_a = number;
   piece.kind = side != 0 ? ContourKind::crease : ContourKind::boundary;
-  piece.begin = frame_.lift(edge.middle - edge.half_length * edge.along);
-  piece.end = frame_.lift(edge.middle + edge.half_length * edge.along);
+  piece.begin = lifted(-1, height);
+  piece.end = lifted(1, height);
   piece.normal_a = edge.out.x() * frame_.first + edge.out.y() * frame_.second;
   if (side != 0) piece.normal_b = -side * plane_.normal;
-  // What blurs a free edge also moves it, by a part of the blur.
-  const double moved = side != 0 ? 0 : kMovedByBlur * best.blur_m;
-  const double off = plane_.sigma_at(0.5 * (piece.begin + piece.end));
+  const double off = std::hypot(plane_.sigma_at(0.5 * (piece.begin + piece.end)), uneven);
   piece.sigma_m = std::sqrt((across * across + moved * moved + off * off) / 2);
-  return across <= config_.most_sigma_m;
+  if (across > config_.most_sigma_m || goes_on(piece) || covered(piece)) return;
+  const double reach = std::max(2.5 * plane_.spacing_m, 2 * noise);
+  if (side != 0 && stands_before(tree_, piece, reach, reach)) return;
+  out.push_back(piece);
+  if (const auto far = far_edge(piece, *section)) out.push_back(*far);
 }
 
 Boundaries BoundaryFinder::find(std::int32_t number) const {
   Boundaries out;
   for (const Ring& ring : outline_.rings) {
-    std::vector<Piece> pieces;
     for (std::size_t k = 0; k < ring.coarse.size(); ++k) {
       const Eigen::Vector2d &a = ring.coarse[k], &b = ring.coarse[(k + 1) % ring.coarse.size()];
       const double length = (b - a).norm();
       if (explained(a, b)) continue;
-      Piece piece;
-      piece.plane_a = number;
-      const bool edge = length >= std::max(config_.least_length_m, 3 * outline_.cell_m) && fit(a, b, piece) &&
-                        !goes_on(piece) && !covered(piece);
-      if (!edge) {
-        out.shadow_m += length;
-        continue;
-      }
-      out.pieces.push_back(piece);
+      const std::size_t before = out.pieces.size();
+      if (length >= std::max(config_.least_length_m, 3 * outline_.cell_m)) fit(a, b, number, out.pieces);
+      if (out.pieces.size() == before) out.shadow_m += length;
     }
   }
   return out;

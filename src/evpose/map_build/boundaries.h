@@ -13,7 +13,7 @@ namespace evpose::map_build {
 
 struct BoundaryConfig {
   double least_length_m = 0.12;  ///< of a piece
-  double most_sigma_m = 0.008;   ///< of a piece's place
+  double most_sigma_m = 0.006;   ///< of a piece's place
   double most_blur_noise = 2;    ///< a real edge is no softer than so many times the noise; a shadow's is
 };
 

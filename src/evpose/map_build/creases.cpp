@@ -22,8 +22,6 @@ constexpr double kCovered = 0.35;       // least share of a bin that its points 
 constexpr double kAmbiguous = 1.5;      // noise: so near to the line a point may be of either plane
 constexpr double kFacetSin = 0.87;      // of the angle between facets of a column, pipe or vault, at most
 constexpr double kFacetWidth_m = 0.25;  // of such facets, at most
-constexpr double kSteep = 0.3;          // normal's share along z of what stands upright, at most
-constexpr double kBeyond_m = 0.1;       // past a crease's end and beside it, where a wall may go on
 constexpr int kLargestGap = 2;          // bins without support that a piece bridges
 
 using PlanePair = std::pair<std::int32_t, std::int32_t>;
@@ -134,7 +132,6 @@ class CreaseFinder {
                                const std::vector<std::int32_t>& thirds) const;
 
  private:
-  bool stands_before(const Piece& piece) const;
   double snapped(const Line& line, double t, double reach_m, const PlanePair& pair,
                  const std::vector<std::int32_t>& thirds) const;
 
@@ -156,34 +153,6 @@ double CreaseFinder::snapped(const Line& line, double t, double reach_m, const P
     if (std::abs(meets - t) < nearest) nearest = std::abs(meets - t), best = meets;
   }
   return best;
-}
-
-/// Two upright faces, and past an end of the crease one of them goes on to both sides: furniture stands
-/// before a wall. Whether it touches the wall is open, and a gap of 2 cm has another edge.
-bool CreaseFinder::stands_before(const Piece& piece) const {
-  constexpr int kProbes = 3;
-  const auto has_points = [&](const FittedPlane& plane, const Eigen::Vector3d& x) {
-    std::uint32_t index = 0;
-    float square = 0;
-    const double reach = std::max(2.5 * plane.spacing_m, 2 * surface_.scale.noise_m);
-    return tree_.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
-           std::sqrt(static_cast<double>(square)) < reach;
-  };
-  const FittedPlane &a = planes_.planes[static_cast<std::size_t>(piece.plane_a)],
-                    &b = planes_.planes[static_cast<std::size_t>(piece.plane_b)];
-  if (std::max(std::abs(a.normal.z()), std::abs(b.normal.z())) > kSteep) return false;
-  for (const auto& [plane, across] : {std::pair(&a, piece.normal_a), std::pair(&b, piece.normal_b)})
-    for (const double end : {-1.0, 1.0}) {
-      int sides[2] = {0, 0};
-      for (int k = 1; k <= kProbes; ++k) {
-        const Eigen::Vector3d past =
-            (end > 0 ? piece.end : piece.begin) + end * k * kBeyond_m * piece.tangent();
-        for (const int s : {0, 1})
-          sides[s] += has_points(*plane, past + (2 * s - 1) * kBeyond_m * across) ? 1 : 0;
-      }
-      if (std::min(sides[0], sides[1]) == kProbes) return true;
-    }
-  return false;
 }
 
 std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact& contact,
@@ -257,7 +226,11 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
     piece.normal_a = out_a;
     piece.normal_b = out_b;
     piece.sigma_m = std::hypot(strip_a.sigma_m, strip_b.sigma_m) / (std::sqrt(2.0) * sine);
-    if (piece.sigma_m > config_.most_sigma_m || stands_before(piece)) continue;
+    const auto reach_on = [&](const FittedPlane& plane) {
+      return std::max(2.5 * plane.spacing_m, 2 * surface_.scale.noise_m);
+    };
+    if (piece.sigma_m > config_.most_sigma_m || stands_before(tree_, piece, reach_on(a), reach_on(b)))
+      continue;
     out.push_back(piece);
   }
   return out;

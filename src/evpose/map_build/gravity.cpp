@@ -8,24 +8,27 @@ namespace evpose::map_build {
 
 UpDirection find_up(const ContourMap& map) {
   constexpr double kNear = 0.26;  // rad: 15 degrees
-  constexpr int kRounds = 5;
+  // Ceilings slope and floors are ramps: planes that disagree count for less, from round to round sooner.
+  constexpr double kDoubted_rad[] = {0.26, 0.1, 0.04, 0.02, 0.01, 0.01, 0.01, 0.01};
   UpDirection out;
   double all = 0;
   for (const MapPlane& plane : map.planes) all += plane.inliers;
-  for (int round = 0; round < kRounds; ++round) {
+  for (const double doubted : kDoubted_rad) {
     // max over u of  sum_level w (n.u)^2 - sum_upright w (n.u)^2.
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(), walls = Eigen::Matrix3d::Zero();
     double level_weight = 0, upright_weight = 0;
     for (const MapPlane& plane : map.planes) {
       const Eigen::Vector3d n = plane.normal.cast<double>();
-      const double along = std::abs(n.dot(out.up)), weight = plane.inliers;
+      const double along = std::abs(n.dot(out.up));
+      const double off = along > std::cos(kNear) ? n.cross(out.up).norm() : along;
+      const double weight = plane.inliers / (1 + off * off / (doubted * doubted));
       if (along > std::cos(kNear)) {
         squares += weight * n * n.transpose();
-        level_weight += weight;
+        level_weight += plane.inliers;
       } else if (along < std::sin(kNear)) {
         squares -= weight * n * n.transpose();
-        walls += weight * n * n.transpose();
-        upright_weight += weight;
+        walls += plane.inliers * n * n.transpose();
+        upright_weight += plane.inliers;
       }
     }
     // Walls of one direction leave the tilt along them open.

@@ -13,6 +13,7 @@
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
+#include "evpose/map_build/section_fit.h"
 #include "evpose/map_build/tiles.h"
 
 namespace evpose::map_build {
@@ -235,6 +236,30 @@ TEST(MapBuilder, WhereTheWallGoesOnAboveACupboardTheirEdgeIsOpen) {
   }
 }
 
+TEST(MapBuilder, TheFirstContrastIsThatOfTheIntensities) {
+  for (const bool dark_floor : {false, true}) {
+    PointCloud cloud = room_corner(33);
+    // The floor's points come first, and are as many as its share of the area.
+    const auto floor = static_cast<std::size_t>(2500 * 1.5 * 1.2);
+    std::mt19937 random(34);
+    std::uniform_int_distribution<int> scatter(-20, 20);
+    for (std::size_t i = 0; i < cloud.points.size(); ++i)
+      cloud.brightness.push_back(
+          static_cast<std::uint8_t>(((i < floor) == dark_floor ? 60 : 160) + scatter(random)));
+    const auto built = build(cloud);
+    ASSERT_TRUE(built) << built.error().line();
+    for (const ContourPoint& p : built->map.points) {
+      if (p.kind != ContourKind::crease) continue;
+      if (std::abs(p.tangent.z()) > 0.9F) {  // between the walls, which are equally bright
+        EXPECT_EQ(p.contrast, 0);
+        continue;
+      }
+      const bool from_floor = std::abs(p.normal.z()) < 0.5F;
+      EXPECT_EQ(p.contrast, from_floor == dark_floor ? 1 : -1);
+    }
+  }
+}
+
 TEST(Tiles, EachPointIsHeldByOneAndNoTileIsTooLarge) {
   std::mt19937 random(28);
   std::uniform_real_distribution<float> across(0, 60), along(0, 25);
@@ -368,6 +393,69 @@ TEST(StepFit, TheTrueSoftnessIsTheLikeliest) {
   }
 }
 
+/// Points around an edge (along, outwards, over the plane) of a plane that ends at y = 0, of a face of
+/// `depth` that hangs from it, and of what is under that; blurred along a ray of unit `ray`.
+std::vector<Eigen::Vector3d> section_points(unsigned seed, double depth, bool under,
+                                            const Eigen::Vector2d& ray) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, kNoise);
+  std::uniform_real_distribution<double> t(-0.5, 0.5), y(-0.2, 0), z(-depth, 0);
+  std::vector<Eigen::Vector3d> out;
+  const auto add = [&](double along, double across, double over) {
+    const Eigen::Vector2d p = Eigen::Vector2d(across, over) + noise(random) * ray;
+    if (std::abs(p.x()) < 0.09 && std::abs(p.y()) < 0.09) out.emplace_back(along, p.x(), p.y());
+  };
+  for (int i = 0; i < 700; ++i) add(t(random), y(random), 0);
+  for (int i = 0; i < static_cast<int>(5000 * depth); ++i) add(t(random), 0, z(random));
+  for (int i = 0; under && i < 400; ++i) add(t(random), y(random), -depth);
+  return out;
+}
+
+TEST(SectionFit, AFaceNarrowerThanItIsNoisyDoesNotPushTheEdge) {
+  // A board of 25 mm seen at 45 degrees: both its edges, each within what is said of it.
+  const SectionWindow window{0.5, 0.09, 0.09, kNoise, 0.7 * kNoise, 0.005};
+  double place = 0, depth = 0;
+  constexpr int kTrials = 12;
+  for (unsigned seed = 0; seed < kTrials; ++seed) {
+    const SectionFit fit =
+        fit_section(section_points(seed, 0.025, true, Eigen::Vector2d(1, 1).normalized()), window);
+    ASSERT_EQ(fit.side, -1) << seed;
+    EXPECT_TRUE(fit.ends);
+    EXPECT_GT(fit.gain, 20);
+    EXPECT_LT(fit.rest_share, 0.1);
+    place += std::pow(fit.place / fit.sigma_place, 2) / kTrials;
+    depth += std::pow((fit.depth - 0.025) / fit.sigma_depth, 2) / kTrials;
+    EXPECT_LT(std::abs(fit.place), 0.004);
+    EXPECT_LT(std::abs(fit.depth - 0.025), 0.012);
+  }
+  EXPECT_LT(place, 4);
+  EXPECT_LT(depth, 4);
+}
+
+TEST(SectionFit, TheOtherWayUpIsTheSameFaceOnTheOtherSide) {
+  const SectionWindow window{0.5, 0.09, 0.09, kNoise, kNoise, 0.005};
+  auto points = section_points(3, 0.06, false, {0.6, 0.8});
+  const SectionFit down = fit_section(points, window);
+  for (auto& p : points) p.z() = -p.z();
+  const SectionFit up = fit_section(points, window);
+  EXPECT_EQ(down.side, -1);
+  EXPECT_EQ(up.side, 1);
+  EXPECT_NEAR(down.place, up.place, 1e-6);
+  EXPECT_NEAR(down.height, -up.height, 1e-6);
+  EXPECT_NEAR(down.depth, up.depth, 1e-6);
+}
+
+TEST(SectionFit, APlaneThatMerelyEndsHasNoFace) {
+  const SectionWindow window{0.5, 0.09, 0.09, kNoise, kNoise, 0.005};
+  for (unsigned seed = 0; seed < 8; ++seed)
+    for (const double angle : {0.0, 0.7, 1.2}) {
+      const SectionFit fit =
+          fit_section(section_points(seed, 0, false, {std::sin(angle), std::cos(angle)}), window);
+      EXPECT_LT(fit.gain, 10) << seed << " " << angle;
+      EXPECT_TRUE(fit.side != 0 || std::abs(fit.place) < 0.01);
+    }
+}
+
 TEST(Neighbours, WithinIsWhatCountingFinds) {
   std::mt19937 random(28);
   std::uniform_real_distribution<float> share(0, 1);
@@ -456,6 +544,18 @@ TEST(Gravity, ATiltedRoomIsLevelledByItsFloorAndWalls) {
     const auto upright = static_cast<double>(std::abs(plane.normal.z()));
     EXPECT_LT(std::min(upright, 1 - upright), 0.01);
   }
+}
+
+TEST(Gravity, ASlopingCeilingDoesNotTiltTheFloor) {
+  ContourMap map;
+  const Eigen::Vector3f floor = Eigen::Vector3f(-0.046F, 0.007F, 1).normalized();
+  map.planes.push_back({floor, 0, 50'000, 0.01F});
+  map.planes.push_back(
+      {Eigen::Vector3f(0.007F, 0.005F, 1).normalized(), 0, 15'000, 0.01F});  // 3 degrees off it
+  map.planes.push_back({floor.cross(Eigen::Vector3f::UnitX()).normalized(), 0, 5000, 0.01F});
+  const UpDirection up = find_up(map);
+  ASSERT_TRUE(up.known);
+  EXPECT_LT((up.up - floor.cast<double>()).norm(), 0.002);
 }
 
 TEST(Gravity, WallsOfOneDirectionLeaveItUnknown) {

@@ -3,31 +3,46 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <optional>
 
 #include "evpose/core/config.h"
+#include "evpose/core/log.h"
 #include "evpose/core/parallel.h"
 #include "evpose/map/triangulation.h"
+#include "evpose/map_build/contrast.h"
 #include "evpose/map_build/tiles.h"
 
 namespace evpose::map_build {
 namespace {
 
+constexpr double kWorstNoise_m = 0.15;  // of any scanner
+using Clock = std::chrono::steady_clock;
+double seconds(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
+
 const Error kGivenUp{"map build", "interrupted", "nothing was written"};
 
-void add_points(const Piece& piece, std::int32_t number, double spacing_m, ContourMap& map) {
+void add_points(const Piece& piece, std::int32_t number, std::int8_t contrast, double spacing_m,
+                ContourMap& map) {
   const int count = std::max(1, static_cast<int>(std::lround(piece.length_m() / spacing_m)));
   ContourPoint p;
-  p.normal = piece.normal_a.cast<float>();
-  p.normal_b = piece.normal_b.cast<float>();
-  p.tangent = piece.tangent().cast<float>();
+  // Where the faces run uneven beside it, an edge is turned a little against its planes.
+  const Eigen::Vector3d along = piece.tangent();
+  const auto across = [&](const Eigen::Vector3d& normal) -> Eigen::Vector3f {
+    const Eigen::Vector3d out = normal - along.dot(normal) * along;
+    return out.norm() > 0.5 ? Eigen::Vector3f(out.normalized().cast<float>()) : Eigen::Vector3f::Zero();
+  };
+  p.normal = across(piece.normal_a);
+  p.normal_b = across(piece.normal_b);
+  p.tangent = along.cast<float>();
   p.length = static_cast<float>(piece.length_m() / count);
   p.sigma = static_cast<float>(piece.sigma_m);
   p.contour = number;
   p.plane_a = piece.plane_a;
   p.plane_b = piece.plane_b;
   p.kind = piece.kind;
+  p.contrast = contrast;
   for (int k = 0; k < count; ++k) {
     p.position = (piece.begin + (piece.end - piece.begin) * ((k + 0.5) / count)).cast<float>();
     map.points.push_back(p);
@@ -122,11 +137,18 @@ Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config,
   figures.duplicates += put_in_order(cloud);
   const auto scale = measure_scale(cloud.points, config.patch, cloud.source);
   if (!scale) return scale.error();
+  if (scale->noise_m > kWorstNoise_m && figures.scale.noise_m == 0)
+    log_warning(text(cloud.source, ": noise of ", std::lround(1e3 * scale->noise_m),
+                     " mm across the surfaces: are these centimetres? Metres are expected"));
   if (!progress(0.1)) return kGivenUp;
+  const auto start = Clock::now();
   const SurfacePoints surface = describe_surface(std::move(cloud.points), *scale, config.patch, pool);
   if (!progress(0.6)) return kGivenUp;
   const Neighbours tree(surface.position);
+  const auto described = Clock::now();
   const Planes planes = find_planes(surface, config.plane);
+  figures.normals_s += seconds(described - start);
+  figures.planes_s += seconds(Clock::now() - described);
   if (planes.planes.empty()) return Error{cloud.source, "no plane has enough points", "give a denser cloud"};
   if (!progress(0.8)) return kGivenUp;
   const std::vector<bool> curved = find_curved(surface, planes);
@@ -159,7 +181,9 @@ Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config,
     piece->plane_a += first_plane;
     if (piece->plane_b >= 0) piece->plane_b += first_plane;
     const std::int32_t number = map.points.empty() ? 0 : map.points.back().contour + 1;
-    add_points(*piece, number, config.point_spacing_m, map);
+    const std::int8_t contrast =
+        cloud.brightness.empty() ? std::int8_t{0} : contrast_of(*piece, surface, tree, cloud.brightness);
+    add_points(*piece, number, contrast, config.point_spacing_m, map);
     length_m += piece->length_m();
   };
   for (const Piece& piece : creases) add(piece, figures.crease_m);

@@ -37,6 +37,7 @@ struct BuildFigures {
   std::size_t points = 0, duplicates = 0, in_planes = 0, planes = 0, curved = 0;
   CloudScale scale;
   double crease_m = 0, boundary_m = 0, shadow_m = 0;  ///< lengths; shadows are left out of the map
+  double normals_s = 0, planes_s = 0;                 ///< elapsed in these steps
 };
 
 struct BuiltMap {

@@ -290,6 +290,34 @@ void Growing::refit() {
   }
 }
 
+/// What the means of cells of a plane scatter beyond what their points' noise explains.
+double unevenness(const SurfacePoints& surface, const FittedPlane& plane) {
+  constexpr double kCellSpacings = 5;
+  constexpr double kFewestInCell = 8;
+  const double cell_m = kCellSpacings * plane.spacing_m;
+  if (!(cell_m > 0)) return 0;
+  const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
+  std::map<std::pair<int, int>, Eigen::Vector3d> cells;  // count, sum and squares of heights
+  for (const std::uint32_t i : plane.points) {
+    const Eigen::Vector3d x = surface.position[i].cast<double>() - plane.centre;
+    const double height = plane.normal.dot(x);
+    const auto key = std::pair(static_cast<int>(std::floor(u.dot(x) / cell_m)),
+                               static_cast<int>(std::floor(v.dot(x) / cell_m)));
+    auto [cell, is_new] = cells.try_emplace(key, Eigen::Vector3d::Zero());
+    cell->second += Eigen::Vector3d(1, height, height * height);
+  }
+  double scatter = 0, expected = 0, used = 0;
+  for (const auto& [key, sums] : cells) {
+    const double n = sums[0];
+    if (n < kFewestInCell) continue;
+    const double mean = sums[1] / n;
+    scatter += mean * mean;
+    expected += (sums[2] / n - mean * mean) / (n - 1);
+    used += 1;
+  }
+  return used > 0 ? std::sqrt(std::max(scatter - expected, 0.0) / used) : 0;
+}
+
 Planes Growing::result() {
   Planes out;
   out.label = label_;
@@ -319,6 +347,7 @@ Planes Growing::result() {
                        spacing.end());
       plane.spacing_m = static_cast<double>(spacing[spacing.size() / 2]);
     }
+    plane.uneven_m = unevenness(surface_, plane);
   }
   return out;
 }

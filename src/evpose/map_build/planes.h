@@ -16,6 +16,7 @@ struct FittedPlane {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of its points
   double rms_m = 0;                                  ///< of its points across it
   double spacing_m = 0;                              ///< median of its points'
+  double uneven_m = 0;  ///< by which small parts of it lie off it beyond chance, 1 sigma
   /// Variances of the fit: of the offset at the centre, and of the tilts about the axes of its points.
   double offset_variance = 0;
   Eigen::Matrix3d tilt_covariance = Eigen::Matrix3d::Zero();
@@ -39,8 +40,8 @@ struct PlaneConfig {
   double least_patches = 1;  ///< points of a plane, in patches that tell a normal
   /// Rms of a plane that has contours, in units of the typical plane's.
   double most_rough = 2;
-  double most_tilt_rad = 0.008;  ///< error of the direction of a plane that has contours, 1 sigma
-  double merge_rad = 0.026;      ///< planes that touch and agree to this angle and to the noise become one
+  double most_tilt_rad = 0.02;  ///< error of the direction of a plane that has contours, 1 sigma
+  double merge_rad = 0.026;     ///< planes that touch and agree to this angle and to the noise become one
 };
 
 /// Region growing on normals, from the flattest points on (EV-Pose, Map Construction): each region follows

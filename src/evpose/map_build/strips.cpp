@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/map_build/strips.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -123,7 +124,7 @@ StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace&
     const double height = plane.distance(x);
     if (std::abs(height) <= kFurthest * noise_m) points.emplace_back(along.dot(x - middle), height);
   }
-  const double prior = std::hypot(plane.sigma_at(middle), kUneven * noise_m);
+  const double prior = std::hypot(plane.sigma_at(middle), std::max(kUneven * noise_m, plane.uneven_m));
   StripFit out;
   out.sigma_m = prior;
   double rms = noise_m, count = 0, height = mean_in(points, 0, kFurthest * noise_m, rms, count);
@@ -144,6 +145,33 @@ StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace&
                           share * (1 - share) * (height - at_plane) * (height - at_plane));
   follow_slope(points, length, noise_m, out);
   return out;
+}
+
+bool stands_before(const Neighbours& tree, const Piece& crease, double reach_a_m, double reach_b_m) {
+  constexpr int kProbes = 3;
+  constexpr double kSteep = 0.3;     // normal's share along z of what stands upright, at most
+  constexpr double kBeyond_m = 0.1;  // past the crease's end and beside it, where a wall may go on
+  const Eigen::Vector3d along = crease.tangent();
+  const auto has_points = [&](const Eigen::Vector3d& x, double reach) {
+    std::uint32_t index = 0;
+    float square = 0;
+    return tree.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
+           std::sqrt(static_cast<double>(square)) < reach;
+  };
+  for (const Eigen::Vector3d& across : {crease.normal_a, crease.normal_b})
+    if (std::abs(along.cross(across).z()) > kSteep) return false;
+  for (const auto& [across, reach] :
+       {std::pair(crease.normal_a, reach_a_m), std::pair(crease.normal_b, reach_b_m)})
+    for (const double end : {-1.0, 1.0}) {
+      int sides[2] = {0, 0};
+      for (int k = 1; k <= kProbes; ++k) {
+        const Eigen::Vector3d past = (end > 0 ? crease.end : crease.begin) + end * k * kBeyond_m * along;
+        for (const int s : {0, 1})
+          sides[s] += has_points(past + (2 * s - 1) * kBeyond_m * across, reach) ? 1 : 0;
+      }
+      if (std::min(sides[0], sides[1]) == kProbes) return true;
+    }
+  return false;
 }
 
 }  // namespace evpose::map_build

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "evpose/map_build/piece.h"
 #include "evpose/map_build/planes.h"
 
 namespace evpose::map_build {
@@ -40,5 +41,10 @@ double strip_reach_m(double noise_m, double sine, double spacing_m);
 /// the face is in its plane and that it is anywhere near, weighed by how well each explains the height; both
 /// cases' spread is in sigma.
 StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace& place, double noise_m);
+
+/// Two upright faces, and past an end of the crease one of them goes on to both sides: furniture stands
+/// before a wall. Whether it touches the wall is open, and a gap of 2 cm has another edge. Reaches: how far a
+/// point of each face may be from where the face is.
+bool stands_before(const Neighbours& tree, const Piece& crease, double reach_a_m, double reach_b_m);
 
 }  // namespace evpose::map_build

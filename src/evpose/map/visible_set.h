@@ -77,7 +77,7 @@ class ContourIndex {
 struct VisibleSetConfig {
   double far_m = 40;       ///< points further away are left out
   double near_m = 0.1;     ///< points nearer are left out
-  double stride_px = 4;    ///< least distance of two points along one contour, in the image
+  double stride_px = 6;    ///< least distance of two points along one contour, in the image
   int budget = 6000;       ///< most points in all
   double margin_px = 20;   ///< points may lie this far outside of the image when chosen, if it is 640 wide
   double refresh_px = 16;  ///< chosen again before the view has moved by this much, in an image 640 wide

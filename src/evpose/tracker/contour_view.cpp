@@ -1,7 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/tracker/contour_view.h"
 
+#include <cstddef>
+
 namespace evpose {
+namespace {
+
+constexpr std::size_t kAhead = 8;
+
+/// Brings what is read of a point near: the map is larger than the caches.
+void fetch(const ContourView& view, std::uint32_t point) {
+  const char* at = reinterpret_cast<const char*>(&view.map.points[point]);
+  __builtin_prefetch(at);
+  __builtin_prefetch(at + offsetof(ContourPoint, sigma));
+  __builtin_prefetch(&view.pieces.of_point[point]);
+}
+
+}  // namespace
 
 void project_contours(const ContourView& view, std::span<const std::uint32_t> points,
                       const BodyMotion& motion, double span_s, std::vector<ContourSample>& samples) {
@@ -16,7 +31,9 @@ void project_contours(const ContourView& view, std::span<const std::uint32_t> po
   const Eigen::Matrix3d R_body_cam = view.T_body_cam.rotation(), R_cam_body = R_body_cam.transpose();
   const Eigen::Vector3d velocity_body = R_body_map * motion.velocity;
   samples.clear();
-  for (const std::uint32_t i : points) {
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (k + kAhead < points.size()) fetch(view, points[k + kAhead]);
+    const std::uint32_t i = points[k];
     const ContourPoint& point = view.map.points[i];
     const Eigen::Vector3d position = point.position.cast<double>();
     const Eigen::Vector3d x_cam = R * position + offset;

@@ -19,7 +19,8 @@ void add_bench_events(CLI::App& bench, std::function<int()>& run);
 void add_bench_faults(CLI::App& bench, std::function<int()>& run);
 void add_bench_picture(CLI::App& bench, std::function<int()>& run);
 
-/// The shared recordings of a folder with `maps`, by name: the room's and the courtyard's.
+/// The shared recordings of a folder with `maps`, by name: the room's and the courtyard's. Of a folder
+/// without, all recordings that `evpose simulate` has put there.
 struct PeerRecording {
   std::string name, folder, map, occluders;
 };

@@ -19,8 +19,10 @@
 namespace evpose {
 namespace {
 
-constexpr double kStretch_s = 0.9;     // of a replay
-constexpr double kFaultFrom_s = 0.35;  // after its start, plus up to 0.1 s
+constexpr double kStretch_s = 1.5;      // of a replay, or what the recording has
+constexpr double kAround_s = 0.07;      // of the recording, left out at its ends
+constexpr double kFaultFrom_s = 0.35;   // after its start, at the earliest
+constexpr double kAfterFault_s = 0.45;  // of the replay, after its begin, at least
 constexpr double kWrongSigma = 5;
 constexpr double kFlagWithin_s = 0.05;
 constexpr double kLost_m = 0.05, kLost_rad = 0.03;  // a pose so wrong is of no use
@@ -58,6 +60,7 @@ struct FaultsRequest {
   unsigned seed = 1;
   std::string only;
   bool each = false;
+  std::vector<int> numbers;
   std::vector<std::string> assignments;
 };
 
@@ -65,6 +68,7 @@ struct Replay {
   Fault fault;
   std::size_t recording;
   unsigned seed;
+  int number;
 };
 
 struct Outcome {
@@ -144,11 +148,12 @@ void spoil_events(Fault fault, TimeNs from, TimeNs to, ImageSize size, std::mt19
 Outcome replay(const Streams& streams, const Replay& what) {
   std::mt19937 random(what.seed);
   const std::vector<TimedPose>& truth = streams.job.truth;
-  const TimeNs first = truth.front().t + 10 * kNsPerMs;
-  const double slack_s = to_seconds(truth.back().t - first) - kStretch_s - 0.05;
-  const TimeNs begin = first + from_seconds(uniform(random, 0, std::max(1e-3, slack_s)));
-  const TimeNs end = begin + from_seconds(kStretch_s);
-  const TimeNs from = begin + from_seconds(kFaultFrom_s + uniform(random, 0, 0.1));
+  const double usable_s = to_seconds(truth.back().t - truth.front().t) - kAround_s,
+               stretch_s = std::min(kStretch_s, usable_s);
+  const TimeNs begin =
+      truth.front().t + 10 * kNsPerMs + from_seconds(uniform(random, 0, usable_s - stretch_s));
+  const TimeNs end = begin + from_seconds(stretch_s);
+  const TimeNs from = begin + from_seconds(uniform(random, kFaultFrom_s, stretch_s - kAfterFault_s));
   const TimeNs to = from + from_seconds(uniform(random, 0.03, 0.2));
 
   auto [packets, imu] = excerpt(streams, begin, end);
@@ -204,8 +209,8 @@ int bench_faults(const FaultsRequest& request) {
   for (const auto& assignment : request.assignments)
     if (auto ok = apply_assignment(table, assignment); !ok) return bad_input(ok.error());
   std::vector<Streams> streams;
+  std::vector<std::string> names;
   for (const PeerRecording& peer : peer_recordings(request.folder)) {
-    if (peer.name == "room_720p") continue;  // one second long
     TrackRequest track;
     track.recording = peer.folder;
     track.map = peer.map;
@@ -213,14 +218,18 @@ int bench_faults(const FaultsRequest& request) {
     auto loaded = load_streams(track, config);
     if (!loaded) return bad_input(loaded.error());
     streams.push_back(std::move(*loaded));
+    names.push_back(peer.name);
   }
   std::vector<Replay> replays;
   for (int i = 0; i < request.replays; ++i) {
     const auto fault = static_cast<std::size_t>(i) % kNames.size();
     if (!request.only.empty() && request.only != kNames[fault]) continue;
+    if (!request.numbers.empty() &&
+        std::find(request.numbers.begin(), request.numbers.end(), i) == request.numbers.end())
+      continue;
     replays.push_back({static_cast<Fault>(fault),
                        static_cast<std::size_t>(i) / kNames.size() % streams.size(),
-                       request.seed * 100'000 + static_cast<unsigned>(i)});
+                       request.seed * 100'000 + static_cast<unsigned>(i), i});
   }
   std::vector<Outcome> outcomes(replays.size());
   ThreadPool pool(request.threads);
@@ -232,21 +241,24 @@ int bench_faults(const FaultsRequest& request) {
     for (std::size_t i = 0; i < replays.size(); ++i) {
       const Outcome& o = outcomes[i];
       std::printf(
-          "%zu %s on recording %zu: %d of %d silent, %.3f to %.3f s after the fault began, up to %.1f sigma, "
+          "%d %s on %s: %d of %d silent, %.3f to %.3f s after the fault began, up to %.1f sigma, "
           "%.1f mm; named %d (%s); of no use %d, told after %.3f s; %.1f mm at the end\n",
-          i, kNames[static_cast<std::size_t>(replays[i].fault)], replays[i].recording, o.silent, o.updates,
-          o.silent_from_s, o.silent_to_s, o.worst, o.worst_mm, o.named ? 1 : 0, o.first_reason.c_str(),
-          o.lost ? 1 : 0, o.flag_delay_s, o.end_error_mm);
+          replays[i].number, kNames[static_cast<std::size_t>(replays[i].fault)],
+          names[replays[i].recording].c_str(), o.silent, o.updates, o.silent_from_s, o.silent_to_s, o.worst,
+          o.worst_mm, o.named ? 1 : 0, o.first_reason.c_str(), o.lost ? 1 : 0, o.flag_delay_s,
+          o.end_error_mm);
     }
-  std::printf("Made by `evpose bench faults`; do not edit.\n\n%d replays of %.1f s, seed %u.\n\n",
-              request.replays, kStretch_s, request.seed);
   std::printf(
-      "| fault | replays | named | first words | silent updates | pose of no use | of these told within 50 "
-      "ms | "
-      "end error median / max mm | not finite |\n|---|---|---|---|---|---|---|---|---|\n");
+      "Made by `evpose bench faults`; do not edit.\n\n%d replays of %.1f s (room_720p is shorter), seed "
+      "%u.\n\n",
+      static_cast<int>(replays.size()), kStretch_s, request.seed);
+  std::printf(
+      "| fault | replays | named | first words | updates | silent updates | in replays | pose of no "
+      "use | of these told within 50 ms | end error median / max mm | not finite "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|\n");
   int silent = 0, silent_replays = 0, updates = 0, late = 0, not_finite = 0;
   for (std::size_t f = 0; f < kNames.size(); ++f) {
-    int count = 0, named = 0, quiet = 0, lost = 0, told = 0, nan = 0;
+    int count = 0, named = 0, made = 0, quiet = 0, quiet_replays = 0, lost = 0, told = 0, nan = 0;
     std::map<std::string, int> words;
     std::vector<double> end_errors;
     for (std::size_t i = 0; i < replays.size(); ++i) {
@@ -256,13 +268,13 @@ int bench_faults(const FaultsRequest& request) {
       named += o.named ? 1 : 0;
       if (o.named && !o.first_reason.empty()) ++words[o.first_reason.substr(0, 48)];
       quiet += o.silent;
-      silent_replays += o.silent > 0 ? 1 : 0;
+      quiet_replays += o.silent > 0 ? 1 : 0;
       lost += o.lost ? 1 : 0;
       const bool in_time = o.lost && o.flag_delay_s >= 0 && o.flag_delay_s <= kFlagWithin_s;
       told += in_time ? 1 : 0;
       late += o.lost && !in_time ? 1 : 0;
       nan += o.nan || o.updates == 0 ? 1 : 0;
-      updates += o.updates;
+      made += o.updates;
       end_errors.push_back(o.end_error_mm);
     }
     if (count == 0) continue;
@@ -270,9 +282,12 @@ int bench_faults(const FaultsRequest& request) {
     std::string most;
     for (const auto& [word, n] : words)
       if (most.empty() || n > words[most]) most = word;
-    std::printf("| %s | %d | %d | %s | %d | %d | %d | %.1f / %.1f | %d |\n", kNames[f], count, named,
-                most.c_str(), quiet, lost, told, end_errors[end_errors.size() / 2], end_errors.back(), nan);
+    std::printf("| %s | %d | %d | %s | %d | %d | %d | %d | %d | %.1f / %.1f | %d |\n", kNames[f], count,
+                named, most.c_str(), made, quiet, quiet_replays, lost, told,
+                end_errors[end_errors.size() / 2], end_errors.back(), nan);
+    updates += made;
     silent += quiet;
+    silent_replays += quiet_replays;
     not_finite += nan;
   }
   std::printf(
@@ -298,6 +313,7 @@ void add_bench_faults(CLI::App& bench, std::function<int()>& run) {
       ->capture_default_str();
   command->add_option("--seed", request->seed, "of all random numbers")->capture_default_str();
   command->add_option("--only", request->only, "only the replays with this fault");
+  command->add_option("--number", request->numbers, "only the replays of these numbers")->delimiter(',');
   command->add_flag("--each", request->each, "a line for each replay");
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command->callback([=, &run] { run = [=] { return bench_faults(*request); }; });

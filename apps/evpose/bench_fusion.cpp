@@ -23,9 +23,10 @@ struct Variant {
 };
 
 const std::vector<Variant> kBackEnds{
-    {"STPE alone", false, {}},
+    {"STPE alone", false, {"events.filter.on=false", "alignment.polarity=false"}},
+    {"... with filter and polarity", false, {}},
     {"particle filter", true, {"fusion.kind=particle"}},
-    {"EKF", true, {"fusion.kind=ekf"}},
+    {"EKF (full, the default)", true, {"fusion.kind=ekf"}},
     {"graph", true, {"fusion.kind=graph"}},
     {"graph, tight", true, {"fusion.kind=graph", "fusion.coupling=tight"}},
     {"graph, tight, in the background",
@@ -56,7 +57,7 @@ struct VariantsRequest {
   const char* name;
   const std::vector<Variant>& variants;
   std::string folder = "../shared/data/peer";
-  std::vector<std::string> only, assignments;
+  std::vector<std::string> only, begins, assignments;
   TrackRequest own;  ///< a recording to take instead of the folder's
 };
 
@@ -155,6 +156,11 @@ int bench_recording(const std::string& name, const TrackRequest& track, const Va
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
       name.c_str());
   for (const Variant& variant : request.variants) {
+    const auto wanted = [&](const std::string& begin) {
+      return std::string(variant.name).starts_with(begin);
+    };
+    if (!request.begins.empty() && std::none_of(request.begins.begin(), request.begins.end(), wanted))
+      continue;
     const auto figures = measure(*streams, variant, request);
     if (!figures) return bad_input(figures.error());
     print_row(variant, *figures);
@@ -182,11 +188,13 @@ int bench_variants(const VariantsRequest& request) {
 void add_bench_variants(CLI::App& bench, std::function<int()>& run, const char* name, const char* what,
                         const std::vector<Variant>& variants) {
   auto* command = bench.add_subcommand(name, what);
-  auto request =
-      std::make_shared<VariantsRequest>(VariantsRequest{name, variants, "../shared/data/peer", {}, {}, {}});
+  auto request = std::make_shared<VariantsRequest>(
+      VariantsRequest{name, variants, "../shared/data/peer", {}, {}, {}, {}});
   command->add_option("folder", request->folder, "folder with the recordings and maps")
       ->capture_default_str();
   command->add_option("--only", request->only, "names of recordings")->delimiter(',');
+  command->add_option("--variant", request->begins, "how the names of variants begin that are wanted")
+      ->delimiter(',');
   auto* own = command->add_option("--recording", request->own.recording,
                                   "a recording with truth, instead of the folder's");
   own->needs(command->add_option("--map", request->own.map, "... and its map"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/tracker/imu_agreement.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "evpose/core/config.h"
@@ -9,19 +10,70 @@ namespace evpose {
 
 void describe(ConfigTable& table, ImuAgreementConfig& c) {
   table.add("over_s", c.over_s, "s", "turns of gyroscope and estimate are compared over so long", {1e-3, 10});
+  table.add("forces_s", c.forces_s, "s", "bends of the path by IMU and estimate are compared over so long",
+            {1e-3, 10});
   table.add("sigma", c.sigma, "", "a difference of so many standard deviations is a contradiction", {1, 1e9});
+  table.add("doubted_sigma", c.doubted_sigma, "", "... and of so many while the IMU's stamps are doubted",
+            {0.1, 1e9});
   table.add("distrust_s", c.distrust_s, "s", "so long after it the IMU is not relied on", {0, 1000});
 }
 
-void ImuAgreement::turn(const ImuSample& a, const ImuSample& b, const Eigen::Vector3d& gyro_bias,
-                        double density) {
-  const ImuIncrement step = integrate(a, b, gyro_bias, Eigen::Vector3d::Zero());
+void ImuAgreement::step(const ImuSample& a, const ImuSample& b, const FusionState& from,
+                        const Eigen::Vector3d& gravity_map, const ImuNoise& noise) {
+  const ImuIncrement step = integrate(a, b, from.gyro_bias, from.accel_bias);
   now_.integral = (now_.integral * step.dq).normalized();
-  now_.bias_integral += step.dt_s * gyro_bias;
-  now_.noise += density * density * step.dt_s;
+  now_.bias_integral += step.dt_s * from.gyro_bias;
+  now_.noise += noise.gyro_density * noise.gyro_density * step.dt_s;
+  const double dt = step.dt_s;
+  const Eigen::Matrix3d R = from.nav.T_map_body.rotation();
+  Forces forces;
+  forces << R * step.dv + dt * gravity_map, dt * R * from.accel_bias, dt * R;
+  now_.twice += dt * now_.once + 0.5 * dt * forces;
+  now_.once += forces;
+  now_.force_noise += noise.accel_density * noise.accel_density * dt;
 }
 
-double ImuAgreement::judge(const FusionState& state) {
+const ImuAgreement::Moment* ImuAgreement::before(double back_s) const {
+  const TimeNs since = now_.t - from_seconds(back_s);
+  const auto oldest = past_.begin() + static_cast<std::ptrdiff_t>(first_);
+  const auto after = std::upper_bound(oldest, past_.end(), since,
+                                      [](TimeNs t, const Moment& moment) { return t < moment.t; });
+  return after == oldest ? nullptr : &*(after - 1);
+}
+
+// In both the bias is held at what it was: it must not have explained the difference away meanwhile.
+
+double ImuAgreement::turn_difference(const Moment& then) const {
+  const double span_s = to_seconds(now_.t - then.t);
+  const Eigen::Vector3d explained = now_.bias_integral - then.bias_integral - span_s * then.bias;
+  const Eigen::Quaterniond measured = then.integral.conjugate() * now_.integral * so3::exp(explained);
+  const Eigen::Vector3d difference =
+      so3::log(measured.conjugate() * then.estimate.conjugate() * now_.estimate);
+  const double variance = then.rotation_variance + now_.rotation_variance + now_.noise - then.noise +
+                          span_s * span_s * then.bias_variance;
+  return difference.cwiseAbs().maxCoeff() / std::sqrt(variance);
+}
+
+double ImuAgreement::bend_difference(const Moment& begin, const Moment& middle) const {
+  const double first_s = to_seconds(middle.t - begin.t), second_s = to_seconds(now_.t - middle.t);
+  if (first_s <= 0 || second_s <= 0) return 0;
+  const double ratio = second_s / first_s;
+  const auto bend = [ratio](const auto& a, const auto& b, const auto& c) {
+    return (c - b - ratio * (b - a)).eval();
+  };
+  const Forces imu = bend(begin.twice, middle.twice, now_.twice);
+  const Eigen::Vector3d measured = imu.col(0) + imu.col(1) - imu.rightCols<3>() * begin.force_bias;
+  const Eigen::Vector3d difference = bend(begin.position, middle.position, now_.position) - measured;
+  // White noise enters by a triangle over the two halves.
+  const double density = (now_.force_noise - begin.force_noise) / (first_s + second_s);
+  const double variance = ratio * ratio * begin.position_variance +
+                          (1 + ratio) * (1 + ratio) * middle.position_variance + now_.position_variance +
+                          density * second_s * second_s * (first_s + second_s) / 3 +
+                          std::pow(0.5 * second_s * (first_s + second_s), 2) * begin.force_bias_variance;
+  return difference.cwiseAbs().maxCoeff() / std::sqrt(variance);
+}
+
+double ImuAgreement::judge(const FusionState& state, bool doubted) {
   using namespace error_state;
   const auto worst = [&state](int at) { return state.covariance.diagonal().segment<3>(at).maxCoeff(); };
   now_.t = state.t;
@@ -29,21 +81,21 @@ double ImuAgreement::judge(const FusionState& state) {
   now_.bias = state.gyro_bias;
   now_.rotation_variance = worst(kPhi);
   now_.bias_variance = worst(kBg);
-  const TimeNs since = state.t - from_seconds(config_.over_s);
-  while (past_.size() >= 2 && past_[1].t <= since) past_.pop_front();
-  double sigmas = 0;
-  if (!past_.empty() && past_.front().t <= since) {
-    const Moment& then = past_.front();
-    const double span_s = to_seconds(now_.t - then.t);
-    // The bias is held at what it was: it must not have explained the difference away meanwhile.
-    const Eigen::Vector3d explained = now_.bias_integral - then.bias_integral - span_s * then.bias;
-    const Eigen::Quaterniond measured = then.integral.conjugate() * now_.integral * so3::exp(explained);
-    const Eigen::Vector3d difference =
-        so3::log(measured.conjugate() * then.estimate.conjugate() * now_.estimate);
-    const double variance = then.rotation_variance + now_.rotation_variance + now_.noise - then.noise +
-                            span_s * span_s * then.bias_variance;
-    sigmas = difference.cwiseAbs().maxCoeff() / std::sqrt(variance);
-    if (!(sigmas <= config_.sigma)) distrust_until_ = state.t + from_seconds(config_.distrust_s);
+  now_.position = state.nav.T_map_body.p;
+  now_.force_bias = state.accel_bias;
+  now_.position_variance = worst(kP);
+  now_.force_bias_variance = worst(kBa);
+  const Moment *turned = before(config_.over_s), *middle = before(0.5 * config_.forces_s),
+               *begin = before(config_.forces_s);
+  const double sigmas = std::max(turned != nullptr ? turn_difference(*turned) : 0,
+                                 begin != nullptr ? bend_difference(*begin, *middle) : 0);
+  if (!(sigmas <= (doubted ? config_.doubted_sigma : config_.sigma)))
+    distrust_until_ = state.t + from_seconds(config_.distrust_s);
+  const TimeNs since = state.t - from_seconds(std::max(config_.over_s, config_.forces_s));
+  while (first_ + 1 < past_.size() && past_[first_ + 1].t <= since) ++first_;
+  if (2 * first_ > past_.size()) {
+    past_.erase(past_.begin(), past_.begin() + static_cast<std::ptrdiff_t>(first_));
+    first_ = 0;
   }
   past_.push_back(now_);
   return sigmas;

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <deque>
+#include <vector>
 
 #include "evpose/fusion/state.h"
 
@@ -12,31 +12,36 @@ namespace evpose {
 class ConfigTable;
 
 struct ImuAgreementConfig {
-  double over_s = 0.06;     ///< turns are compared over so long
-  double sigma = 2.5;       ///< a difference of so many standard deviations is a contradiction
-  double distrust_s = 1.0;  ///< so long after it the IMU is not relied on
+  double over_s = 0.06;        ///< turns are compared over so long ...
+  double forces_s = 0.25;      ///< ... and how the path bends over so long
+  double sigma = 2.5;          ///< a difference of so many standard deviations is a contradiction ...
+  double doubted_sigma = 1.5;  ///< ... and of so many while the stamps are doubted
+  double distrust_s = 1.0;     ///< so long after it the IMU is not relied on
 };
 void describe(ConfigTable& table, ImuAgreementConfig& config);
 
-/// Holds the gyroscope against the camera: the turn over a short while as the one integrates and as the
-/// estimate, led by the contours, has it. A clock that has jumped, an axis of a wrong scale or sign, or a
-/// reading that is frozen shows as a difference that neither noise nor bias explains.
+/// Holds the IMU against the camera: turn and bend of the path over a short while as the one integrates them
+/// and as the estimate, led by the contours, has them. A clock that has jumped, an axis of a wrong scale or
+/// sign, or a reading that is frozen shows as a difference that neither noise nor bias explains.
+/// The bend is p(t) - 2 p(t - T) + p(t - 2 T): it needs no velocity, which contours alone tell badly.
 class ImuAgreement {
  public:
   explicit ImuAgreement(const ImuAgreementConfig& config) : config_(config) {}
 
   /// The estimate comes from elsewhere.
-  void forget() { past_.clear(); }
-  /// A step of the IMU with the bias that the estimate had; `density` of the gyroscope's noise,
-  /// rad/s/sqrt(Hz).
-  void turn(const ImuSample& a, const ImuSample& b, const Eigen::Vector3d& gyro_bias, double density);
-  /// The estimate after an update. The difference in standard deviations; 0 while there is too little to
-  /// tell.
-  double judge(const FusionState& state);
+  void forget() { past_.clear(), first_ = 0; }
+  /// A step of the IMU from the estimate's time on, with the densities of its noise.
+  void step(const ImuSample& a, const ImuSample& b, const FusionState& from,
+            const Eigen::Vector3d& gravity_map, const ImuNoise& noise);
+  /// The estimate after an update, and whether the IMU's stamps are doubted. The difference in standard
+  /// deviations; 0 while there is too little to tell.
+  double judge(const FusionState& state, bool doubted);
   /// Whether the IMU is not to be relied on at time t.
   bool distrusted(TimeNs t) const { return t < distrust_until_; }
 
  private:
+  /// By columns: acceleration without its bias, the biases taken off, a force along each axis of the body.
+  using Forces = Eigen::Matrix<double, 3, 5>;
   struct Moment {
     TimeNs t = 0;
     Eigen::Quaterniond estimate = Eigen::Quaterniond::Identity();  ///< R_map_body
@@ -45,10 +50,21 @@ class ImuAgreement {
     double noise = 0;                                              ///< variance of the integral, rad^2
     Eigen::Vector3d bias = Eigen::Vector3d::Zero();
     double rotation_variance = 0, bias_variance = 0;  ///< of one axis, of the worst
+    // Likewise of the position, in the map: what the columns of Forces add up to, once and twice.
+    Eigen::Vector3d position = Eigen::Vector3d::Zero(), force_bias = Eigen::Vector3d::Zero();
+    Forces once = Forces::Zero(), twice = Forces::Zero();
+    double force_noise = 0;  ///< variance of the velocity that it makes, m^2/s^2
+    double position_variance = 0, force_bias_variance = 0;
   };
+  /// The last moment that lies so far back, if there is any.
+  const Moment* before(double back_s) const;
+  double turn_difference(const Moment& then) const;
+  double bend_difference(const Moment& begin, const Moment& middle) const;
+
   ImuAgreementConfig config_;
   Moment now_;
-  std::deque<Moment> past_;  ///< at the updates, in order of time
+  std::vector<Moment> past_;  ///< at the updates, in order of time; ...
+  std::size_t first_ = 0;     ///< ... from here on still asked for
   TimeNs distrust_until_ = 0;
 };
 

@@ -30,102 +30,135 @@ void describe(ConfigTable& table, ImuWatchConfig& c) {
   table.add("clipped_samples", c.clipped_samples, "", "equal largest readings that are saturation", {2, 1e6});
   table.add("stuck_samples", c.stuck_samples, "", "equal readings of one axis that are a stuck sensor",
             {3, 1e6});
-  table.add("spike_sigma", c.spike_sigma, "",
-            "a reading so many usual changes from the one before is a spike", {1, 1e6});
-  table.add("spike_gyro_rad_s2", c.spike_gyro_rad_s2, "rad/s^2", "... if the rate changes faster than this",
-            {0, 1e9});
+  table.add("spike_sigma", c.spike_sigma, "", "a reading so many usual changes off the last may be a spike",
+            {1, 1e6});
+  table.add("spike_gyro_rad_s2", c.spike_gyro_rad_s2, "rad/s^2",
+            "... if the rate has changed faster than this", {0, 1e9});
   table.add("spike_accel_m_s3", c.spike_accel_m_s3, "m/s^3", "... or the force faster than this", {0, 1e9});
-  table.add("spike_samples", c.spike_samples, "", "spikes in a row that are a change of the motion",
+  table.add("spike_samples", c.spike_samples, "", "readings off in a row that are a change of the motion",
             {1, 1e6});
   table.add("doubt_s", c.doubt_s, "s", "stamps are doubted so long after a gap or a step back", {0, 100});
   table.add("remember_s", c.remember_s, "s", "a fault is told so long after its last sign", {0, 100});
 }
 
-void ImuWatch::tell(TimeNs t, std::string what) {
+void ImuWatch::tell(TimeNs t, std::string what, TimeNs until) {
   while (!told_.empty() && to_seconds(t - told_.front().t) > kForget_s + config_.remember_s)
     told_.pop_front();
   if (!told_.empty() && told_.back().t >= t) return;  // the first sign of one instant is kept
-  told_.push_back({t, std::move(what)});
+  told_.push_back({t, std::max(t, until), std::move(what)});
 }
 
-std::optional<CheckedImu> ImuWatch::take(const ImuSample& s) {
+bool ImuWatch::Kept::any_off() const { return std::find(off.begin(), off.end(), true) != off.end(); }
+
+std::span<const CheckedImu> ImuWatch::take(const ImuSample& s) {
+  released_.clear();
   if (!s.gyro.allFinite() || !s.accel.allFinite()) {
     tell(any_ ? last_.t : s.t, "IMU reading is not a number");
-    return std::nullopt;
+    return {};
   }
   if (!any_) {
     any_ = true;
     last_ = good_ = s;
-    return CheckedImu{s};
+    released_.push_back({s});
+    return released_;
   }
   if (s.t <= last_.t) {
     if (s.t < last_.t) doubt_ = "IMU time goes back", doubt_until_ = last_.t + from_seconds(config_.doubt_s);
     tell(last_.t, s.t < last_.t ? "IMU time goes back" : "IMU time stands still");
-    return std::nullopt;
+    return {};
   }
-  CheckedImu out{s};
+  Kept now{{s}};
   const double interval_s = to_seconds(s.t - last_.t);
   if (period_s_ == 0) period_s_ = interval_s;
   if (interval_s > config_.gap_periods * period_s_) {
-    out.suspect = true;
-    tell(last_.t + from_seconds(config_.gap_periods * period_s_), "IMU samples are missing");
+    now.checked.suspect = true;
+    tell(last_.t + from_seconds(config_.gap_periods * period_s_), "IMU samples are missing", s.t);
     doubt_ = text("IMU gap of ", std::round(1e4 * interval_s) / 10, " ms");
     doubt_until_ = s.t + from_seconds(config_.doubt_s);
+    // What comes after a gap tells nothing of what came before.
+    for (Kept& kept : kept_) kept.checked.suspect |= kept.any_off();
+    release();
   } else if (interval_s < kRegular * period_s_) {
     period_s_ += 0.05 * (interval_s - period_s_);
   }
-  out.suspect |= mend(interval_s, &out.sample);
-  if (s.t < doubt_until_) {
-    out.doubted = true;
-    tell(s.t, doubt_);
-  }
+  mend(&now);
+  now.checked.doubted = s.t < doubt_until_;
   last_ = s;
-  good_ = out.sample;
-  return out;
+  kept_.push_back(now);
+  flatten_spikes();
+  const bool lasts = static_cast<int>(kept_.size()) >= config_.spike_samples;
+  if (lasts || !kept_.back().any_off()) release();
+  if (now.checked.doubted) tell(s.t, doubt_);
+  return released_;
 }
 
-bool ImuWatch::mend(double interval_s, ImuSample* s) {
-  const ImuSample raw = *s;
-  bool wrong = false;
+void ImuWatch::mend(Kept* now) {
+  const ImuSample raw = now->checked.sample;
+  const double since_good_s = to_seconds(raw.t - good_.t);
   int stuck = 0, stuck_at = -1;
   std::array<double, 2> square{};
   for (int i = 0; i < 6; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const int sensor = i / 3;
+    const auto sensor = static_cast<std::size_t>(i / 3);
     const double value = axis(raw, i), magnitude = std::abs(value), change = value - axis(good_, i);
     equal_[k] = value == axis(last_, i) ? equal_[k] + 1 : 0;
     if (equal_[k] + 1 >= config_.stuck_samples) ++stuck, stuck_at = i;
     const double range = i < 3 ? config_.gyro_range_rad_s : config_.accel_range_m_s2;
     const bool clipped = equal_[k] + 1 >= config_.clipped_samples && magnitude >= largest_[k] &&
                          magnitude > kLeastClip[sensor];
-    const double usual = std::sqrt(mean_square_[static_cast<std::size_t>(sensor)]);
-    const double possible = (i < 3 ? config_.spike_gyro_rad_s2 : config_.spike_accel_m_s3) * interval_s;
-    const bool spike =
-        std::abs(change) > std::max({config_.spike_sigma * usual, possible, kLeastSpike[sensor]});
-    const bool saturated = magnitude >= range || clipped;
-    spikes_[k] = spike && !saturated ? spikes_[k] + 1 : 0;
-    if (spike && spikes_[k] >= config_.spike_samples) spikes_[k] = 0;  // so it is, whatever it is
-    if (saturated || spikes_[k] > 0) {
-      axis(*s, i) = axis(good_, i);
-      wrong = true;
-      tell(raw.t, text(saturated ? "IMU saturated: " : "IMU spike: ", kAxes[k]));
+    const double usual = std::sqrt(mean_square_[sensor]);
+    if (magnitude >= range || clipped) {
+      axis(now->checked.sample, i) = axis(good_, i);
+      now->checked.suspect = true;
+      tell(raw.t, text("IMU saturated: ", kAxes[k]));
     } else {
-      largest_[k] = std::max(largest_[k], magnitude);
+      const double possible = (i < 3 ? config_.spike_gyro_rad_s2 : config_.spike_accel_m_s3) * since_good_s;
+      now->off[k] = std::abs(change) > std::max({config_.spike_sigma * usual, possible, kLeastSpike[sensor]});
+      if (!now->off[k]) largest_[k] = std::max(largest_[k], magnitude);
     }
     // A spike teaches no more than the least spike would.
     const double lesson = usual > 0 ? std::min(std::abs(change), config_.spike_sigma * usual) : change;
-    square[static_cast<std::size_t>(sensor)] += lesson * lesson / 3;
+    square[sensor] += lesson * lesson / 3;
   }
   for (std::size_t sensor = 0; sensor < 2; ++sensor)
     mean_square_[sensor] += kLearnChange * (square[sensor] - mean_square_[sensor]);
-  if (stuck == 0 || stuck == 6) return wrong;
+  if (stuck == 0 || stuck == 6) return;
   tell(raw.t, text("IMU stuck: ", kAxes[static_cast<std::size_t>(stuck_at)]));
-  return true;
+  now->checked.suspect = true;
+}
+
+void ImuWatch::flatten_spikes() {
+  const Kept& newest = kept_.back();
+  const double span_s = to_seconds(newest.checked.sample.t - good_.t);
+  for (std::size_t at = 0; at + 1 < kept_.size(); ++at)
+    for (int i = 0; i < 6; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      Kept& kept = kept_[at];
+      if (!kept.off[k] || newest.off[k]) continue;
+      const double share = to_seconds(kept.checked.sample.t - good_.t) / span_s;
+      axis(kept.checked.sample, i) =
+          axis(good_, i) + share * (axis(newest.checked.sample, i) - axis(good_, i));
+      kept.checked.suspect = true;
+      kept.off[k] = false;
+      tell(kept.checked.sample.t, text("IMU spike: ", kAxes[k]));
+    }
+}
+
+void ImuWatch::release() {
+  for (const Kept& kept : kept_) {
+    released_.push_back(kept.checked);
+    good_ = kept.checked.sample;
+    for (int i = 0; i < 6; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (kept.off[k]) largest_[k] = std::max(largest_[k], std::abs(axis(good_, i)));
+    }
+  }
+  kept_.clear();
 }
 
 std::string ImuWatch::fault(TimeNs t) const {
   for (auto told = told_.rbegin(); told != told_.rend(); ++told)
-    if (told->t <= t) return to_seconds(t - told->t) <= config_.remember_s ? told->what : "";
+    if (told->t <= t) return to_seconds(t - told->until) <= config_.remember_s ? told->what : "";
   return "";
 }
 

@@ -121,10 +121,11 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
 
 void Tracker::add_imu(const ImuSample& sample) {
   if (setup_.motion != MotionModel::imu) return;
-  const auto checked = imu_watch_.take(sample);
-  if (!checked || (!imu_.empty() && sample.t <= imu_.back().sample.t)) return;
-  imu_.push_back(*checked);
-  if (state_callback_) to_tell_.push_back(*checked);
+  for (const CheckedImu& checked : imu_watch_.take(sample)) {
+    if (!imu_.empty() && checked.sample.t <= imu_.back().sample.t) continue;
+    imu_.push_back(checked);
+    if (state_callback_) to_tell_.push_back(checked);
+  }
   // Before the start only the last sample matters.
   while (imu_.size() >= 2 && imu_[1].sample.t <= fusion_->state().t) imu_.pop_front();
   tell_states();
@@ -195,7 +196,11 @@ void Tracker::tell_states() {
   while (!to_tell_.empty() && to_tell_.front().sample.t < imu_time(next_update_)) {
     const CheckedImu& next = to_tell_.front();
     if (update_number_ > 0 && next.sample.t > ahead_.t) {
-      fusion_->motion().step(ahead_, told_, next.sample, trust_in(next, next, ahead_.t));
+      const TimeNs t = fusion_->state().t;
+      const bool held = agreement_.distrusted(t);
+      fusion_->motion().step(ahead_, held ? held_reading(told_.t, ahead_) : told_,
+                             held ? held_reading(next.sample.t, ahead_) : next.sample,
+                             trust_in(next, next, t));
       told_ = next.sample;
       state_callback_(ahead_);
     }
@@ -203,25 +208,42 @@ void Tracker::tell_states() {
   }
 }
 
-/// Whether the IMU is silent up to this time. While it is, the bias stands for the rate that the held reading
-/// does not know; when it is back, it is what it was.
+/// Whether the IMU is silent up to this time. While it is, or is not relied on, the gyroscope's bias stands
+/// for the rate that a held reading does not know; afterwards both biases are what they were.
 bool Tracker::bridge_silence(TimeNs until) {
   if (setup_.motion != MotionModel::imu) return false;
-  const bool blind = bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
-  if (blind && !blind_) before_blind_ = fusion_->state();
+  const bool silent = bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
+  const bool blind = silent || agreement_.distrusted(until);
+  if (blind && !blind_) {
+    before_blind_ = fusion_->state();
+    held_gyro_ = before_blind_.angular_rate + before_blind_.gyro_bias;
+  }
   if (!blind && blind_) {
-    FusionState state = fusion_->state();
-    state.gyro_bias = before_blind_.gyro_bias;
-    state.accel_bias = before_blind_.accel_bias;
-    state.covariance.rightCols<6>().setZero();
-    state.covariance.bottomRows<6>().setZero();
-    state.covariance.bottomRightCorner<6, 6>() = before_blind_.covariance.bottomRightCorner<6, 6>();
-    fusion_->start(state);
+    fusion_->start(with_imu_biases());
     if (imu_.size() >= 2 && imu_[0].missing) {
       imu_[0] = {{imu_[0].sample.t, imu_[1].sample.gyro, imu_[1].sample.accel}, true, imu_[1].doubted, false};
     }
   }
-  return blind_ = blind;
+  blind_ = blind;
+  return silent;
+}
+
+/// The newest state with the biases of the IMU itself, known as well as before it was silent or distrusted.
+FusionState Tracker::with_imu_biases() const {
+  FusionState state = fusion_->state();
+  if (!blind_) return state;
+  state.gyro_bias = before_blind_.gyro_bias;
+  state.accel_bias = before_blind_.accel_bias;
+  state.covariance.rightCols<6>().setZero();
+  state.covariance.bottomRows<6>().setZero();
+  state.covariance.bottomRightCorner<6, 6>() = before_blind_.covariance.bottomRightCorner<6, 6>();
+  return state;
+}
+
+/// A reading of a body that keeps its velocity and its rate, in place of one that is wrong.
+ImuSample Tracker::held_reading(TimeNs t, const FusionState& state) const {
+  return {t, held_gyro_,
+          state.accel_bias - state.nav.T_map_body.q.conjugate() * fusion_->motion().gravity_map()};
 }
 
 ImuTrust Tracker::trust_in(const CheckedImu& a, const CheckedImu& b, TimeNs t) const {
@@ -252,11 +274,14 @@ void Tracker::predict(TimeNs t) {
     const ImuTrust reading = a.missing || b.missing   ? ImuTrust::none
                              : a.suspect || b.suspect ? ImuTrust::suspect
                                                       : ImuTrust::good;
-    agreement_.turn(a.sample, b.sample, state.gyro_bias,
-                    fusion_->motion().noise_at(b.sample.gyro, b.sample.accel, reading).gyro_density);
+    agreement_.step(a.sample, b.sample, with_imu_biases(), fusion_->motion().gravity_map(),
+                    fusion_->motion().noise_at(b.sample.gyro, b.sample.accel, reading));
     if (capture_.searching() || verify_until_ != 0)
       moved_ = joined(moved_, integrate(a.sample, b.sample, state.gyro_bias, state.accel_bias));
-    fusion_->predict(a.sample, b.sample, trust_in(a, b, t));
+    if (agreement_.distrusted(t))
+      fusion_->predict(held_reading(a.sample.t, state), held_reading(b.sample.t, state), ImuTrust::none);
+    else
+      fusion_->predict(a.sample, b.sample, trust_in(a, b, t));
   };
   while (imu_[1].sample.t < t) {
     step(imu_[0], imu_[1]);
@@ -428,7 +453,10 @@ Update Tracker::update(TimeNs t) {
   const Calibration found = fusion_->calibration();
   setup_.T_body_cam = {found.turn * given_T_body_cam_.q, given_T_body_cam_.p + found.shift};
 
-  if (setup_.motion == MotionModel::imu && !searching) agreement_.judge(fusion_->state());
+  // At first the estimate is that of the start, not yet that of the contours.
+  const bool settled = health_.state() != Health::waiting && health_.state() != Health::initialising;
+  if (setup_.motion == MotionModel::imu && !searching && settled)
+    agreement_.judge(with_imu_biases(), imu_.front().doubted);
   if (evidence.fault.empty() && agreement_.distrusted(t)) evidence.fault = "IMU contradicts the camera";
 
   const Matrix6d covariance = fusion_->state().pose_covariance();

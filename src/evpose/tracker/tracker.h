@@ -120,6 +120,8 @@ class Tracker {
   bool imu_reaches(TimeNs t) const;
   void tell_states();
   bool bridge_silence(TimeNs until);
+  FusionState with_imu_biases() const;
+  ImuSample held_reading(TimeNs t, const FusionState& state) const;
   ImuTrust trust_in(const CheckedImu& a, const CheckedImu& b, TimeNs t) const;
   void predict(TimeNs t);
   double sigma_px() const;
@@ -177,7 +179,8 @@ class Tracker {
   double typical_depth_m_ = 3;
   ImuIncrement moved_;  ///< over the last prediction, while the pose is searched
   FusionState before_search_, before_blind_;
-  bool blind_ = false;       ///< the IMU is silent
+  Eigen::Vector3d held_gyro_ = Eigen::Vector3d::Zero();  ///< reading of the last rate that was trusted
+  bool blind_ = false;                                   ///< the IMU is silent or not relied on
   TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
   double astray_s_ = 0;      ///< for how long it has been lost, or its events have not gathered at contours
   EventFront::Counts counted_;

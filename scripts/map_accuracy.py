@@ -15,7 +15,7 @@ import sys
 import tempfile
 
 PEER = {"room": ["room_spiral", "room_hover"], "courtyard": ["courtyard_landing"]}
-SIMULATED, SIMULATED_S = ["indoor_spiral", "outdoor_spiral"], 1.5
+SIMULATED, SIMULATED_S = ["indoor_spiral", "outdoor_spiral"], 0.5
 REAL = ["hall_lidar_4cm", "campus_building_livox", "street_lidar_scan", "room_laser_scan", "office_rgbd"]
 
 
@@ -49,7 +49,8 @@ def simulated_scenes(evpose, scratch):
     scenes = []
     for name in SIMULATED:
         folder = scratch / name
-        run(evpose, "-q", "simulate", name, "-o", folder, "--duration", SIMULATED_S, "--set", "lidar.on=true")
+        run(evpose, "-q", "simulate", name, "-o", folder, "--duration", SIMULATED_S, "--set", "lidar.on=true",
+            "--set", "camera.size=vga")
         scenes.append(scene_of(f"{name} (simulated)", folder / "map_raw.ply", folder / "contours.ply",
                                folder / "mesh.ply", [folder]))
     return scenes

@@ -13,35 +13,23 @@ namespace evpose::map_build {
 namespace {
 
 constexpr double kMovedByBlur = 0.3;
-constexpr double kWindow = 2.5;           // noise: half width of what is taken for one surface
-constexpr double kReachNoise = 4;         // noise: of what is looked at around an edge
-constexpr double kBand_m = 0.03;          // height of the band in which a second face is looked for, at least
-constexpr double kBandSpacings = 2;       // ... and in spacings
-constexpr double kFewestHanging = 8;      // points of a second face
-constexpr double kLeastHanging = 0.3;     // ... and its density, as a share of the plane's
-constexpr double kMostUnexplained = 0.1;  // share of the points at an edge that no surface there explains
-constexpr double kMostDepthSigma = 0.3;   // noise: of the far edge of a narrow face
-constexpr double kLeastDepth = 1.5;       // noise: of a face whose edges are told apart ...
-constexpr double kMostDepth = 3.5;        // ... and of one too narrow for a plane of its own
-constexpr double kLeastGain = 10;         // of log likelihood, by a second face
-constexpr double kOffPlane = 0.4;         // noise: so far a plane may lie off its surface at an edge
-constexpr double kHigh = 1.2;             // noise: few of the plane's points are further from it
-constexpr double kDenser = 1.5;           // ... and over the plane's density
-constexpr double kExcess = 3;             // sigma: of points at the edge over chance
+constexpr double kWindow = 2.5;            // noise: half width of what is taken for one surface
+constexpr double kReachNoise = 4;          // noise: of what is looked at around an edge
+constexpr double kFewestHanging = 8;       // points of a second face
+constexpr double kLeastHanging = 0.3;      // ... and its density, as a share of the plane's
+constexpr double kMostUnexplained = 0.1;   // share of the points at an edge that no surface there explains
+constexpr double kMostDepthSigma = 0.3;    // noise: of the far edge of a narrow face
+constexpr double kLeastDepth = 1.5;        // noise: of a face whose edges are told apart ...
+constexpr double kMostDepth = 3.5;         // ... and of one too narrow for a plane of its own
+constexpr double kLeastGain = 10;          // of log likelihood, by a second face
+constexpr double kHigh = 1.2;              // noise: few of the plane's points are further from it
+constexpr double kDenser = 1.5;            // ... and over the plane's density
+constexpr double kExcess = 3;              // sigma: of points at the edge over chance
 constexpr std::size_t kMostPoints = 1200;  // for one edge
 constexpr double kUneven = 0.1;            // noise: that many points do not average away
 constexpr double kMostRest = 0.12;         // density beyond a free edge, as a share of that within
 
 double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane);
-
-/// Keeps every so manieth point.
-void thin_out(std::vector<Eigen::Vector3d>& points, std::size_t most) {
-  if (points.size() <= most) return;
-  const std::size_t step = points.size() / most + 1;
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < points.size(); k += step) points[kept++] = points[k];
-  points.resize(kept);
-}
 
 class BoundaryFinder {
  public:
@@ -211,7 +199,12 @@ BoundaryFinder::OwnPoints BoundaryFinder::own_points(const std::vector<Eigen::Ve
     out.points = std::move(half[1 - fuller]);
     out.one_side = true;
   }
-  thin_out(out.points, kMostPoints);
+  if (out.points.size() > kMostPoints) {
+    const std::size_t step = out.points.size() / kMostPoints + 1;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < out.points.size(); k += step) out.points[kept++] = out.points[k];
+    out.points.resize(kept);
+  }
   return out;
 }
 
@@ -235,19 +228,9 @@ StepFit BoundaryFinder::likeliest(const std::vector<Eigen::Vector3d>& points, do
 /// there is something that is no face, or more than faces: what ends where is open.
 std::optional<SectionFit> BoundaryFinder::second_face(const Edge& edge) const {
   const double noise = surface_.scale.noise_m;
-  SectionWindow window;
-  window.half_length = edge.half_length;
-  window.half_width = 3 * noise + kBand_m;
-  window.half_height = 3 * noise + std::max(kBand_m, kBandSpacings * plane_.spacing_m);
-  window.noise_m = noise;
-  window.height_noise_m = std::clamp(plane_.rms_m, 0.3 * noise, 1.5 * noise);
-  window.sigma_height_m = kOffPlane * noise;
-  std::vector<Eigen::Vector3d> points = local_points(edge, std::hypot(window.half_width, window.half_height));
-  std::erase_if(points, [&](const Eigen::Vector3d& p) {
-    return std::abs(p.y()) > window.half_width || std::abs(p.z()) > window.half_height;
-  });
-  thin_out(points, kMostPoints);
-  const SectionFit section = fit_section(points, window);
+  const SectionWindow window = section_window(edge.half_length, noise, plane_.rms_m, plane_.spacing_m);
+  const SectionFit section =
+      fit_section(local_points(edge, std::hypot(window.half_width, window.half_height)), window);
   const bool likelier = section.side != 0 && section.gain >= kLeastGain;
   const double on_face = section.face * 2 * edge.half_length * section.depth;
   const bool dense = on_face >= kFewestHanging && section.face >= kLeastHanging * section.plane;

@@ -9,9 +9,11 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "evpose/core/parallel.h"
 #include "evpose/map_build/neighbours.h"
+#include "evpose/map_build/section_fit.h"
 #include "evpose/map_build/strips.h"
 
 namespace evpose::map_build {
@@ -132,6 +134,7 @@ class CreaseFinder {
                                const std::vector<std::int32_t>& thirds) const;
 
  private:
+  bool contradicted(const Piece& piece) const;
   double snapped(const Line& line, double t, double reach_m, const PlanePair& pair,
                  const std::vector<std::int32_t>& thirds) const;
 
@@ -153,6 +156,42 @@ double CreaseFinder::snapped(const Line& line, double t, double reach_m, const P
     if (std::abs(meets - t) < nearest) nearest = std::abs(meets - t), best = meets;
   }
   return best;
+}
+
+/// The plane has as many points far beyond the edge as far before it: another face merely stands on it.
+bool goes_on(const std::vector<Eigen::Vector3d>& points, const SectionWindow& window, double height_m) {
+  constexpr double kFar = 0.6, kAsMany = 0.4;
+  double beyond = 0, before = 0;
+  for (const auto& p : points) {
+    if (std::abs(p.z()) > height_m || std::abs(p.y()) > window.half_width) continue;
+    beyond += p.y() > kFar * window.half_width ? 1 : 0;
+    before += p.y() < -kFar * window.half_width ? 1 : 0;
+  }
+  return beyond > kAsMany * before;
+}
+
+/// The section across it, explained by faces at right angles, has its edge elsewhere: before books the fronts
+/// of their boards go on.
+bool CreaseFinder::contradicted(const Piece& piece) const {
+  constexpr double kRightAngle = 0.94, kLeastGain = 10, kMostSigmas = 3, kMostNoise = 0.5, kInPlane = 2.5;
+  const double noise = surface_.scale.noise_m;
+  if (piece.normal_a.cross(piece.normal_b).norm() < kRightAngle) return false;
+  const Eigen::Vector3d along = piece.tangent(), middle = 0.5 * (piece.begin + piece.end);
+  for (const auto& [number, out, other] : {std::tuple(piece.plane_a, piece.normal_a, piece.normal_b),
+                                           std::tuple(piece.plane_b, piece.normal_b, piece.normal_a)}) {
+    const FittedPlane& plane = planes_.planes[static_cast<std::size_t>(number)];
+    const SectionWindow window = section_window(0.5 * piece.length_m(), noise, plane.rms_m, plane.spacing_m);
+    std::vector<Eigen::Vector3d> points = points_around(surface_, tree_, piece.begin, piece.end,
+                                                        std::hypot(window.half_width, window.half_height));
+    const Eigen::Vector3d over = along.cross(out);
+    for (Eigen::Vector3d& p : points) p = {along.dot(p - middle), out.dot(p - middle), over.dot(p - middle)};
+    if (goes_on(points, window, kInPlane * plane.rms_m)) continue;
+    const SectionFit section = fit_section(points, window);
+    const int side = over.dot(other) > 0 ? -1 : 1;  // the other face goes from the edge against `other`
+    if (section.side != side || section.gain < kLeastGain) continue;
+    if (std::abs(section.place) > kMostNoise * noise + kMostSigmas * section.sigma_place) return true;
+  }
+  return false;
 }
 
 std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact& contact,
@@ -229,7 +268,8 @@ std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact&
     const auto reach_on = [&](const FittedPlane& plane) {
       return std::max(2.5 * plane.spacing_m, 2 * surface_.scale.noise_m);
     };
-    if (piece.sigma_m > config_.most_sigma_m || stands_before(tree_, piece, reach_on(a), reach_on(b)))
+    if (piece.sigma_m > config_.most_sigma_m || stands_before(tree_, piece, reach_on(a), reach_on(b)) ||
+        contradicted(piece))
       continue;
     out.push_back(piece);
   }

@@ -16,6 +16,7 @@ constexpr int kGeometry = 4;  // place, slope, height, depth
 constexpr int kSurfaces = 5;  // plane, face, under, beyond, rest
 constexpr int kFirstRounds = 10, kMostRounds = 40;
 constexpr double kNoGain = 1e-3;
+constexpr std::size_t kMostPoints = 1200;
 constexpr double kLeastDepthNoise = 0.6;  // shallower faces are none
 
 /// The normal distribution and its integral from a table: they are asked for millions of times.
@@ -270,7 +271,31 @@ double Section::improve(State& s, int rounds) const {
 
 }  // namespace
 
-SectionFit fit_section(std::span<const Eigen::Vector3d> points, const SectionWindow& window) {
+SectionWindow section_window(double half_length, double noise_m, double rms_m, double spacing_m) {
+  constexpr double kReach = 3;         // noise
+  constexpr double kBand_m = 0.03;     // beyond that, for faces to be seen in, at least ...
+  constexpr double kBandSpacings = 2;  // ... and in spacings
+  constexpr double kOffPlane = 0.4;    // noise: so far a plane may lie off its surface at an edge
+  SectionWindow out{};
+  out.half_length = half_length;
+  out.half_width = kReach * noise_m + kBand_m;
+  out.half_height = kReach * noise_m + std::max(kBand_m, kBandSpacings * spacing_m);
+  out.noise_m = noise_m;
+  out.height_noise_m = std::clamp(rms_m, 0.3 * noise_m, 1.5 * noise_m);
+  out.sigma_height_m = kOffPlane * noise_m;
+  return out;
+}
+
+SectionFit fit_section(std::span<const Eigen::Vector3d> all, const SectionWindow& window) {
+  std::vector<Eigen::Vector3d> points;
+  for (const auto& p : all)
+    if (std::abs(p.y()) <= window.half_width && std::abs(p.z()) <= window.half_height) points.push_back(p);
+  if (points.size() > kMostPoints) {
+    const std::size_t step = points.size() / kMostPoints + 1;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < points.size(); k += step) points[kept++] = points[k];
+    points.resize(kept);
+  }
   SectionFit out;
   if (points.size() < 20) return out;
   const Section section(points, window);

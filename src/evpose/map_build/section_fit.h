@@ -30,10 +30,13 @@ struct SectionWindow {
   double sigma_height_m;                        ///< to which the plane is known
 };
 
-/// Maximum likelihood for points (along, outwards, over the plane) in the window: a Poisson process whose
-/// surfaces are blurred by noise. Faces narrower than the noise mix their points with the plane's, and push
-/// an edge that is fitted to these alone outwards by as much as the noise; here each point is shared between
-/// the surfaces.
+/// As wide and high as the noise asks for; `rms_m` and `spacing_m` of the plane.
+SectionWindow section_window(double half_length, double noise_m, double rms_m, double spacing_m);
+
+/// Maximum likelihood for points (along, outwards, over the plane), those in the window: a Poisson process
+/// whose surfaces are blurred by noise. Faces narrower than the noise mix their points with the plane's, and
+/// push an edge that is fitted to these alone outwards by as much as the noise; here each point is shared
+/// between the surfaces.
 SectionFit fit_section(std::span<const Eigen::Vector3d> points, const SectionWindow& window);
 
 }  // namespace evpose::map_build

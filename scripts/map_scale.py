@@ -90,7 +90,7 @@ def main():
     parser.add_argument("millions", type=float, nargs="*", default=[0.1, 1, 10])
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--pcl", type=float, default=1)
-    wanted = parser.parse_args()
+    wanted = parser.parse_intermixed_args()
     points = hall(wanted.shared / "data/real/clouds/hall_lidar_4cm.ply")
     print("| points | tiles | processor s | s per million | elapsed s | peak memory MB | bytes per point |")
     print("|---|---|---|---|---|---|---|")

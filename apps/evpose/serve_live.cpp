@@ -232,13 +232,16 @@ class SourceThread {
 void print_outcome(const Session& session, const StreamQueue& queue, const Outputs& outputs) {
   const auto& c = session.counts();
   const auto q = queue.counts();
+  const auto thinned =
+      c.events_thinned +
+      (session.tracker() ? static_cast<std::uint64_t>(session.tracker()->events().counts().shed) : 0);
   std::printf("%s; %llu updates, %llu restarts, %llu stalls\n", to_string(outputs.health()),
               static_cast<unsigned long long>(c.updates), static_cast<unsigned long long>(c.restarts),
               static_cast<unsigned long long>(c.stalls));
   if (c.updates > 0) std::printf("updates: %s\n", outputs.healths().c_str());
   std::printf("events: %llu arrived, %llu shed, %llu late; most waiting at once %llu\n",
               static_cast<unsigned long long>(q.events_in),
-              static_cast<unsigned long long>(q.events_shed + c.events_shed),
+              static_cast<unsigned long long>(q.events_shed + c.events_shed + thinned),
               static_cast<unsigned long long>(c.events_late),
               static_cast<unsigned long long>(q.most_waiting));
   if (outputs.delays().count() > 0)
@@ -258,7 +261,8 @@ Expected<RunOutcome> finish(RunFolder& run, const TrackJob& job, const ServeRequ
   RunSummary summary = summarise(job, request.track, *session.tracker());
   summary.events_read = session.counts().events - session.counts().events_shed;
   summary.events_kept += session.counts().events_kept;
-  summary.events_shed += queue.counts().events_shed + session.counts().events_shed;
+  summary.events_shed +=
+      queue.counts().events_shed + session.counts().events_shed + session.counts().events_thinned;
   summary.wall_s = wall_s() - wall_start;
   summary.cpu_s = cpu_s() - cpu_start;
   summary.peak_memory_mb = peak_memory_mb();

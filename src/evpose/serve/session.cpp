@@ -76,7 +76,10 @@ void Session::tick(TimeNs now_ns) {
 void Session::reset(const std::string& why) { restart(why, false); }
 
 void Session::restart(const std::string& why, bool from_last) {
-  if (tracker_) counts_.events_kept += static_cast<std::uint64_t>(tracker_->events().counts().kept);
+  if (tracker_) {
+    counts_.events_kept += static_cast<std::uint64_t>(tracker_->events().counts().kept);
+    counts_.events_thinned += static_cast<std::uint64_t>(tracker_->events().counts().shed);
+  }
   tracker_.reset();
   before_.clear();
   events_.last = imu_.last = std::numeric_limits<TimeNs>::min();

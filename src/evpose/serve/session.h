@@ -53,7 +53,8 @@ class Session {
   struct Counts {
     std::uint64_t updates = 0, restarts = 0, stalls = 0;
     std::uint64_t events = 0, events_shed = 0, events_late = 0, imu = 0, imu_late = 0;
-    std::uint64_t events_kept = 0;  ///< by the noise filters of all trackers so far
+    std::uint64_t events_kept = 0;     ///< by the noise filters of all earlier trackers
+    std::uint64_t events_thinned = 0;  ///< beyond events.most_mev_s, by all earlier trackers
   };
   const Counts& counts() const { return counts_; }
 

@@ -90,7 +90,7 @@ def main():
     arguments.add_argument("--only", nargs="*", help="names of the table's flights")
     a = arguments.parse_args()
     a.recordings.mkdir(parents=True, exist_ok=True)
-    flights = [(f"{s}, 1280x720", s, LARGE, []) for s in PLAIN]
+    flights = [(f"{s}, 1280x720", s, LARGE, []) for s in PLAIN + SPEEDS[:3]]
     lamps = [f"lamps.off_at_s={0.4 * a.seconds}", f"lamps.on_at_s={0.7 * a.seconds}"]
     flights += [(s, s, SMALL + (lamps if s == "hdr_lights_off" else []), []) for s in PLAIN + SPEEDS + HARD]
     flights += [(f"imu_1khz, {rate} Hz", "imu_1khz", SMALL, ["--set", f"rate_hz={rate}"])

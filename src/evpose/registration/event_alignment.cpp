@@ -115,11 +115,9 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
   const auto count_px = static_cast<float>(config_.count_px);
   if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);
   if (p.verdicts) owners_.assign(p.events.size(), -1);
-  for (std::size_t k = 0; k < p.events.size(); ++k) {
+  index_.find_all(p.events, p.now_us, &found_);
+  for (const auto& [k, owner] : found_) {
     const FrontEvent& e = p.events[k];
-    const auto age_us = static_cast<float>(p.now_us - e.stamp_us);
-    const StripIndex::Owner owner = index_.find(e.x, e.y, age_us);
-    if (owner.strip < 0) continue;
     const auto verdict = [&](EventVerdict v) {
       if (p.verdicts) (*p.verdicts)[k] = v, owners_[k] = owner.strip;
     };

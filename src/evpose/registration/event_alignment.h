@@ -157,6 +157,7 @@ class EventAlignment {
   // Of the last call, one for each sample; kept so that nothing is allocated from call to call.
   std::vector<Strip> strips_;
   std::vector<Line> lines_;
+  std::vector<StripIndex::Found> found_;
   std::vector<Sum> sums_;
   std::vector<SampleOffset> offsets_;
   std::vector<Cluster> clusters_;

@@ -2,6 +2,8 @@
 #include "evpose/registration/strip_index.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 namespace evpose {
 namespace {
@@ -15,6 +17,10 @@ bool same_line(const Strip& a, const Strip& b) {
          std::abs(a.nx * (b.x - a.x) + a.ny * (b.y - a.y)) < kSameLine_px;
 }
 
+constexpr std::size_t kSide = 8;  // events searched side by side
+using Floats = float __attribute__((vector_size(4 * kSide)));
+using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
+
 float inverse(float v) { return std::abs(v) > 1 / kFarther ? 1 / v : kFarther; }
 
 }  // namespace
@@ -24,12 +30,13 @@ StripIndex::StripIndex(ImageSize size, double half_length_px, double ambiguity_p
       rows_((size.height + kCell_px - 1) / kCell_px),
       half_length_(static_cast<float>(half_length_px)),
       ambiguity_(static_cast<float>(ambiguity_px)),
-      heads_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), -1) {}
+      heads_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
 
 void StripIndex::build(std::span<const Strip> strips, float span_us) {
   strips_.assign(strips.begin(), strips.end());
-  entries_.clear();
-  std::fill(heads_.begin(), heads_.end(), -1);
+  strips_.push_back({0, 0, 0, 0, 0, 0, -1});
+  entries_.assign(1, {static_cast<std::int32_t>(strips.size()), 0});
+  std::fill(heads_.begin(), heads_.end(), 0);
   for (std::size_t i = 0; i < strips.size(); ++i) enter(static_cast<std::int32_t>(i), span_us);
 }
 
@@ -61,6 +68,81 @@ void StripIndex::enter(std::int32_t number, float span_us) {
       entries_.push_back({number, head});
       head = static_cast<std::int32_t>(entries_.size() - 1);
     }
+  }
+}
+
+StripIndex::Owner StripIndex::find(float x, float y, float age_us) const {
+  Owner nearest;
+  Hit hits[kMostHits];
+  int n = 0;
+  for (std::int32_t k = heads_[cell_of(x, y)]; k > 0; k = entries_[static_cast<std::size_t>(k)].next) {
+    const std::int32_t number = entries_[static_cast<std::size_t>(k)].strip;
+    const Strip& s = strips_[static_cast<std::size_t>(number)];
+    const float dx = x - s.x, dy = y - s.y, along = std::abs(s.nx * dy - s.ny * dx);
+    const float d = s.nx * dx + s.ny * dy + (s.speed - s.curvature * age_us) * age_us;
+    if (along > half_length_ || std::abs(d) > s.reach) continue;
+    if (n == kMostHits) return {};
+    if (n == 0 || std::abs(d) < std::abs(nearest.distance)) nearest = {number, d};
+    hits[n++] = {number, d, along};
+  }
+  return n < 2 ? nearest : settle(nearest, {hits, static_cast<std::size_t>(n)});
+}
+
+void StripIndex::find_all(std::span<const FrontEvent> events, std::uint32_t now_us,
+                          std::vector<Found>* found) {
+  // Most events are far from any contour: written in any case and kept by counting, as a branch would be
+  // guessed wrong.
+  close_.resize(events.size());
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < events.size(); ++k) {
+    close_[count] = static_cast<std::uint32_t>(k);
+    count += heads_[cell_of(events[k].x, events[k].y)] > 0;
+  }
+  found->clear();
+  for (std::size_t begin = 0; begin < count; begin += kSide)
+    find_eight(events, {&close_[begin], std::min(kSide, count - begin)}, now_us, found);
+}
+
+void StripIndex::find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
+                            std::uint32_t now_us, std::vector<Found>* found) const {
+  std::array<std::size_t, kSide> entry{};
+  Floats x{}, y{}, age{};
+  for (std::size_t l = 0; l < which.size(); ++l) {
+    const FrontEvent& e = events[which[l]];
+    x[l] = e.x, y[l] = e.y, age[l] = static_cast<float>(now_us - e.stamp_us);
+    entry[l] = static_cast<std::size_t>(heads_[cell_of(e.x, e.y)]);
+  }
+  Floats least = Floats{} + kFarther, distance{};
+  Ints owner = Ints{} - 1, hits{};
+  for (std::size_t going = 1; going > 0;) {
+    std::array<const Strip*, kSide> strip;
+    Ints number;
+    going = 0;
+    for (std::size_t l = 0; l < kSide; ++l) {
+      const Entry& e = entries_[entry[l]];
+      number[l] = e.strip;
+      strip[l] = &strips_[static_cast<std::size_t>(e.strip)];
+      going |= entry[l] = static_cast<std::size_t>(e.next);
+    }
+    const auto all = [&](float Strip::*m) {
+      return Floats{strip[0]->*m, strip[1]->*m, strip[2]->*m, strip[3]->*m,
+                    strip[4]->*m, strip[5]->*m, strip[6]->*m, strip[7]->*m};
+    };
+    const Floats dx = x - all(&Strip::x), dy = y - all(&Strip::y), nx = all(&Strip::nx), ny = all(&Strip::ny);
+    const Floats t = nx * dy - ny * dx, along = t < 0 ? -t : t;
+    const Floats d = nx * dx + ny * dy + (all(&Strip::speed) - all(&Strip::curvature) * age) * age;
+    const Floats across = d < 0 ? -d : d;
+    const Ints hit = (along <= half_length_) & (across <= all(&Strip::reach));
+    const Ints nearer = hit & (across < least);
+    least = nearer ? across : least;
+    distance = nearer ? d : distance;
+    owner = nearer ? number : owner;
+    hits -= hit;
+  }
+  for (std::size_t l = 0; l < which.size(); ++l) {
+    if (hits[l] == 0) continue;
+    const Owner one = hits[l] == 1 ? Owner{owner[l], distance[l]} : find(x[l], y[l], age[l]);
+    if (one.strip >= 0) found->push_back({which[l], one});
   }
 }
 

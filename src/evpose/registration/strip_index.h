@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "evpose/camera/camera.h"
+#include "evpose/event/event_front.h"
 
 namespace evpose {
 
 /// The part of the image that one contour sample answers for: a rectangle across the contour that moves with
 /// it. An event at e of age a has the signed distance n.(e - x) + speed a - curvature a^2 from the contour.
-struct Strip {
+struct alignas(32) Strip {
   float x, y;              ///< centre at the time of the update, px
   float nx, ny;            ///< unit normal of the contour
   float speed, curvature;  ///< px/us, px/us^2
@@ -35,24 +35,15 @@ class StripIndex {
     float distance = 0;       ///< signed, px
   };
   /// Position inside the image.
-  Owner find(float x, float y, float age_us) const {
-    std::int32_t k = heads_[static_cast<std::size_t>(static_cast<int>(y) / kCell_px * columns_ +
-                                                     static_cast<int>(x) / kCell_px)];
-    Owner nearest;
-    Hit hits[kMostHits];
-    int n = 0;
-    for (; k >= 0; k = entries_[static_cast<std::size_t>(k)].next) {
-      const std::int32_t number = entries_[static_cast<std::size_t>(k)].strip;
-      const Strip& s = strips_[static_cast<std::size_t>(number)];
-      const float dx = x - s.x, dy = y - s.y, along = std::abs(s.nx * dy - s.ny * dx);
-      const float d = s.nx * dx + s.ny * dy + (s.speed - s.curvature * age_us) * age_us;
-      if (along > half_length_ || std::abs(d) > s.reach) continue;
-      if (n == kMostHits) return {};
-      if (n == 0 || std::abs(d) < std::abs(nearest.distance)) nearest = {number, d};
-      hits[n++] = {number, d, along};
-    }
-    return n < 2 ? nearest : settle(nearest, {hits, static_cast<std::size_t>(n)});
-  }
+  Owner find(float x, float y, float age_us) const;
+
+  struct Found {
+    std::uint32_t event;
+    Owner owner;
+  };
+  /// The events that a strip owns, in their order; `now_us`: of the strips, on the events' clock. As find()
+  /// for each, eight side by side, which differs by rounding.
+  void find_all(std::span<const FrontEvent> events, std::uint32_t now_us, std::vector<Found>* found);
 
  private:
   static constexpr int kCell_px = 8, kMostHits = 16;  // more than so many strips at one place are a tangle
@@ -63,14 +54,21 @@ class StripIndex {
   struct Entry {
     std::int32_t strip, next;
   };
+  void find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
+                  std::uint32_t now_us, std::vector<Found>* found) const;
   Owner settle(const Owner& nearest, std::span<const Hit> hits) const;
+  std::size_t cell_of(float x, float y) const {
+    return static_cast<std::size_t>(static_cast<int>(y) / kCell_px * columns_ +
+                                    static_cast<int>(x) / kCell_px);
+  }
   void enter(std::int32_t number, float span_us);
 
   int columns_, rows_;
   float half_length_, ambiguity_;
-  std::vector<Strip> strips_;
-  std::vector<Entry> entries_;
-  std::vector<std::int32_t> heads_;  ///< of each cell's list of entries, -1: none
+  std::vector<Strip> strips_;         ///< and one more, which nothing is near
+  std::vector<Entry> entries_;        ///< the first is every list's end: it is of that strip and its own next
+  std::vector<std::int32_t> heads_;   ///< of each cell's list of entries
+  std::vector<std::uint32_t> close_;  ///< events in cells with strips
 };
 
 }  // namespace evpose

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -121,6 +123,45 @@ TEST(StripIndex, OrderOfTheStripsDoesNotMatter) {
     owned += i >= 0;
   }
   EXPECT_GT(owned, 2000);
+}
+
+/// Eight side by side find what each finds alone, but for rounding at borders.
+TEST(StripIndex, ManyEventsFindWhatEachFindsAlone) {
+  Random random(5);
+  std::vector<Strip> strips;
+  for (int i = 0; i < 200; ++i) strips.push_back(random.strip());
+  StripIndex index = index_of(strips);
+  constexpr std::uint32_t kNow_us = 3;  // the clock has just begun anew
+  for (const std::size_t count : {0, 3, 8, 9, 20003}) {
+    std::vector<FrontEvent> events(count);
+    for (FrontEvent& e : events) {
+      const Place p = random.place();
+      e.stamp_us = kNow_us - static_cast<std::uint32_t>(p.age_us);
+      e.x = static_cast<std::uint16_t>(p.x);
+      e.y = static_cast<unsigned>(p.y) & 0x7fffU;
+    }
+    std::vector<StripIndex::Found> found;
+    index.find_all(events, kNow_us, &found);
+    std::size_t next = 0, rounded = 0;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const FrontEvent& e = events[k];
+      const Place p{static_cast<float>(e.x), static_cast<float>(e.y),
+                    static_cast<float>(kNow_us - e.stamp_us)};
+      const auto alone = index.find(p.x, p.y, p.age_us);
+      const bool listed = next < found.size() && found[next].event == k;
+      const auto together = listed ? found[next++].owner : StripIndex::Owner{};
+      if (together.strip == alone.strip) {
+        EXPECT_NEAR(together.distance, alone.distance, 1e-3);
+      } else {
+        ++rounded;
+        EXPECT_TRUE(
+            std::any_of(strips.begin(), strips.end(), [&](const Strip& s) { return on_border(s, p); }));
+      }
+    }
+    EXPECT_EQ(next, found.size());
+    EXPECT_LE(rounded, count / 1000);
+    EXPECT_GE(found.size(), count / 10);
+  }
 }
 
 TEST(StripIndex, EarlierStripsAreForgotten) {

@@ -5,7 +5,8 @@
     map_pictures.py EVPOSE SHARED OUT_FOLDER     needs h5py and chromium
 
 Builds the maps of the shared clouds of a hall, a facade and a room, and imports the edge cloud of a sofa; draws each
-seen askew from above (contours only: what they are must be seen in them). Creases blue, boundaries red.
+seen askew from above (contours only: what they are must be seen in them). Creases blue, boundaries red; marks: round bodies'
+axes orange, shadows grey.
 """
 import math
 import pathlib
@@ -20,7 +21,7 @@ import numpy as np
 VIEWS = {"hall": ("hall_lidar_4cm", 25, 35), "facade": ("campus_building_livox", 150, 15),
          "room": ("room_laser_scan", 25, 45), "sofa": ("vector_sofa_semi_dense", 0, 0)}
 WIDTH = 1000
-COLOURS = {1: "#0b5cad", 2: "#d43a4f"}
+COLOURS = {1: "#0b5cad", 2: "#d43a4f", 4: "#e08e0b", 5: "#b9c2bd"}
 
 
 def contours(path):

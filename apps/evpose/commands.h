@@ -35,6 +35,7 @@ void add_bench(CLI::App& app, std::function<int()>& run);
 struct MapFigures {
   std::size_t contours = 0;
   double length_m = 0;
+  std::array<double, kContourKinds> by_kind_m{};
   Eigen::Vector3d low = Eigen::Vector3d::Zero(), high = Eigen::Vector3d::Zero();  ///< bounds, map frame
 };
 MapFigures figures_of(const ContourMap& map);

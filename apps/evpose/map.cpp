@@ -52,6 +52,10 @@ int print_map(const ContourMap& map) {
   const MapFigures f = figures_of(map);
   std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map.points.size(), f.contours,
               f.length_m);
+  for (std::size_t k = 0; k < f.by_kind_m.size(); ++k)
+    if (f.by_kind_m[k] > 0)
+      std::printf("  %-8s %.1f m%s\n", kContourKindNames[k], f.by_kind_m[k],
+                  is_mark(static_cast<ContourKind>(k)) ? ", marks: nothing is aligned to them" : "");
   std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", f.low.x(), f.high.x(),
               f.low.y(), f.high.y(), f.low.z(), f.high.z());
   std::printf("occluders  %zu triangles\nframe      %s\n", map.occluders.triangles.size(), map.frame.c_str());
@@ -94,6 +98,7 @@ MapFigures figures_of(const ContourMap& map) {
   for (const auto& p : map.points) {
     low = low.cwiseMin(p.position), high = high.cwiseMax(p.position);
     out.length_m += static_cast<double>(p.length);
+    out.by_kind_m[static_cast<std::size_t>(p.kind)] += static_cast<double>(p.length);
     if (p.contour >= 0) contours.insert(p.contour);
   }
   out.contours = contours.size();

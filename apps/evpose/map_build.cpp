@@ -24,6 +24,7 @@ namespace {
 struct BuildRequest {
   std::string cloud, output = "map.h5";
   std::vector<std::string> assignments;
+  std::vector<double> viewpoints;  ///< x, y, z of one after the other
   int threads = 1;
   bool level = false;
 };
@@ -34,9 +35,14 @@ int build(const BuildRequest& request) {
   describe(table, config);
   for (const std::string& assignment : request.assignments)
     if (Status done = apply_assignment(table, assignment); !done) return bad_input(done.error());
+  if (request.viewpoints.size() % 3 != 0)
+    return bad_input({"--viewpoint", text("has ", request.viewpoints.size(), " numbers in all"),
+                      "give X,Y,Z in metres for each"});
   const auto start = std::chrono::steady_clock::now();
   auto cloud = read_cloud(request.cloud);
   if (!cloud) return bad_input(cloud.error());
+  for (std::size_t k = 0; k < request.viewpoints.size(); k += 3)
+    cloud->viewpoints.emplace_back(&request.viewpoints[k]);
   const InterruptGuard guard;
   ThreadPool pool(request.threads);
   Progress progress("building");
@@ -51,16 +57,19 @@ int build(const BuildRequest& request) {
   if (request.level && up.known) map_build::level(built->map, up.up);
   if (const auto ok = write_map_h5(request.output, built->map); !ok) return bad_input(ok.error());
   const auto& f = built->figures;
+  const auto of = [&](ContourKind kind) { return f.by_kind_m[static_cast<std::size_t>(kind)]; };
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::printf(
       "points     %zu, %.1f cm apart, noise %.1f mm, patches of %d%s\n"
       "planes     %zu hold %.1f %% of the points; %zu are facets of curved surfaces\n"
-      "creases    %.1f m\nboundaries %.1f m; %.1f m of outlines left out: soft, short or unsure\n"
+      "creases    %.1f m\nboundaries %.1f m; %.1f m of outlines left out: short or unsure\n"
+      "marks      %.1f m of shadows, %.1f m of round bodies: %zu cylinders, %zu poles\n"
       "time       %.1f s; normals %.2f, planes %.2f\n",
       f.points, 100 * f.scale.spacing_m, 1e3 * f.scale.noise_m, f.scale.neighbours,
       f.tiles > 1 ? text(", ", f.tiles, " tiles").c_str() : "", f.planes,
-      100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved, f.crease_m,
-      f.boundary_m, f.shadow_m, wall_s, f.normals_s, f.planes_s);
+      100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved,
+      of(ContourKind::crease), of(ContourKind::boundary), f.left_out_m, of(ContourKind::shadow),
+      of(ContourKind::limb), f.cylinders, f.poles, wall_s, f.normals_s, f.planes_s);
   if (!up.known)
     std::printf("up         unknown: neither a floor nor walls of two directions%s\n",
                 request.level ? "; not levelled" : "");
@@ -74,10 +83,11 @@ int build(const BuildRequest& request) {
 }
 
 void print_score(const char* name, const KindScore& s) {
-  std::printf("%-9s %8.1f %8.1f  %5.1f %5.1f   %5.1f %5.1f   %5.2f %5.2f %5.2f   %5.2f %5.2f  %5.2f\n", name,
-              s.built_m, s.true_m, 100 * s.precision_5mm, 100 * s.precision_10mm, 100 * s.recall_5mm,
-              100 * s.recall_10mm, s.p50_mm, s.mean_mm, s.p95_mm, s.direction_mean_deg, s.direction_p95_deg,
-              s.sigma_ratio);
+  std::printf(
+      "%-9s %8.1f %8.1f  %5.1f %5.1f   %5.1f %5.1f   %5.2f %5.2f %5.2f   %5.2f %5.2f  %5.2f %5.2f %5.1f\n",
+      name, s.built_m, s.true_m, 100 * s.precision_5mm, 100 * s.precision_10mm, 100 * s.recall_5mm,
+      100 * s.recall_10mm, s.p50_mm, s.mean_mm, s.p95_mm, s.direction_mean_deg, s.direction_p95_deg,
+      s.sigma_ratio, s.sigma_bulk, 100 * s.outliers);
 }
 
 void print_classes(const char* name, const char* unit, double scale,
@@ -102,8 +112,10 @@ int compare(const std::string& built_path, const std::string& true_path, const s
   }
   const MapScore score = score_map(*built, *truth, cloud_path.empty() ? nullptr : &cloud, {});
   std::printf(
-      "          built m   true m  precision %%    recall %%      distance mm         direction deg  error/\n"
-      "                             5 mm 10 mm    5 mm 10 mm    p50  mean   p95    mean   p95   sigma\n");
+      "          built m   true m  precision %%    recall %%      distance mm         direction deg   error "
+      "/ sigma\n"
+      "                             5 mm 10 mm    5 mm 10 mm    p50  mean   p95    mean   p95    rms  bulk  "
+      "out %%\n");
   print_score("all", score.all);
   print_score("crease", score.crease);
   print_score("boundary", score.boundary);
@@ -125,6 +137,12 @@ void add_map_build(CLI::App& map, std::function<int()>& run) {
   command->add_option("cloud", request->cloud, "points in metres, of one frame")->required();
   command->add_option("-o,--output", request->output, "map file")->capture_default_str();
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
+  command
+      ->add_option("--viewpoint", request->viewpoints,
+                   "X,Y,Z where a scanner stood, in the cloud's frame; may be given again. What nobody "
+                   "could see ends in a shadow, not in an edge")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->add_flag("--level", request->level, "turn the map so that up, as floors and walls say, is z");
   command->add_option("--threads", request->threads, "that work; the map is the same for any number")
       ->capture_default_str()

@@ -361,6 +361,24 @@ TEST(MapScore, AShiftIsTheDistanceAndHalfTheLengthIsHalfTheRecall) {
   EXPECT_EQ(further.boundary.built_m, 0);
 }
 
+TEST(MapScore, SigmaOfTheBulkIsToldApartFromWrongEdgesAndMarksDoNotCount) {
+  const ContourMap truth = straight_contour(0, 20, 0);
+  ContourMap built = truth;
+  std::mt19937 random(12);
+  std::normal_distribution<float> off(0, 0.002F);
+  for (std::size_t i = 0; i < built.points.size(); ++i) {
+    Eigen::Vector3f& x = built.points[i].position;
+    x.y() = off(random), x.z() = off(random);
+    if (i % 10 == 0) x.y() = 0.02F;
+    if (i % 10 == 1) built.points[i].kind = ContourKind::shadow, x.y() = 0.02F;
+  }
+  const KindScore all = score_map(built, truth, nullptr, {}).all;
+  EXPECT_NEAR(all.sigma_bulk, 1.09, 0.04);  // the median of eight good ones and a bad one
+  EXPECT_NEAR(all.outliers, 1.0 / 9, 0.005);
+  EXPECT_GT(all.sigma_ratio, 2);
+  EXPECT_NEAR(all.built_m, 18, 1e-3);
+}
+
 TEST(MapScore, ShortAndUnseenEdgesDoNotCount) {
   ContourMap truth = straight_contour(0, 2, 0);
   for (const auto& p : straight_contour(5, 5.2, 0).points) truth.points.push_back(p);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr float kLink_m = 0.035F;          // true points so near to each other, in line, are of one edge
 constexpr float kSameEdge_m = 0.003F;      // ... and those so near across it
+constexpr double kOutlierSigma = 3.5;      // one in 450 by chance
 constexpr float kFurthestRival_m = 0.08F;  // parallel edges further apart do not disturb each other
 
 std::vector<Eigen::Vector3f> positions(const ContourMap& map, const Eigen::Vector3d& anchor) {
@@ -157,14 +158,26 @@ struct Tally {
     score.direction_mean_deg = kDegree * direction.mean();
     score.direction_p95_deg = kDegree * direction.quantile(0.95);
     score.sigma_ratio = std::sqrt(ratio.mean());
+    // Across a contour errors have two directions: half of their squares are below 2 ln 2.
+    score.sigma_bulk = std::sqrt(ratio.quantile(0.5) / std::numbers::ln2);
+    double far = 0, whole = 0;
+    for (const auto& [square, weight] : ratio.values) {
+      whole += weight;
+      far += 2 * square > kOutlierSigma * kOutlierSigma ? weight : 0;
+    }
+    score.outliers = whole > 0 ? far / whole : 0;
     return score;
   }
 };
 
 }  // namespace
 
-MapScore score_map(const ContourMap& built, const ContourMap& truth, const PointCloud* cloud,
+MapScore score_map(const ContourMap& judged, const ContourMap& truth, const PointCloud* cloud,
                    const MapScoreConfig& config) {
+  ContourMap built;
+  built.anchor = judged.anchor;
+  for (const ContourPoint& p : judged.points)
+    if (!is_mark(p.kind)) built.points.push_back(p);
   const auto of_built = positions(built, truth.anchor), of_truth = positions(truth, truth.anchor);
   Tally all, crease, boundary;
   const auto of_kind = [&](ContourKind kind) -> Tally* {

@@ -26,6 +26,8 @@ struct KindScore {
   double p50_mm = 0, mean_mm = 0, p95_mm = 0;    ///< across, of what was built within reach of a true contour
   double direction_mean_deg = 0, direction_p95_deg = 0;
   double sigma_ratio = 0;  ///< rms of distance / stated sigma, of what is within reach; 1 is honest
+  /// The same of the better half, and the share beyond 3.5 sigma: contours that sit on another edge.
+  double sigma_bulk = 0, outliers = 0;
 };
 
 /// Recall of the true edges of one class.
@@ -45,8 +47,8 @@ struct MapScore {
 
 /// Compares contours point by point. The distance from a true contour is that across it. `cloud`: what the
 /// map was built from, to tell which true edges it saw; nullptr: all. Both maps must have tangents and
-/// lengths.
-MapScore score_map(const ContourMap& built, const ContourMap& truth, const PointCloud* cloud,
+/// lengths; marks do not count.
+MapScore score_map(const ContourMap& judged, const ContourMap& truth, const PointCloud* cloud,
                    const MapScoreConfig& config);
 
 }  // namespace evpose

@@ -64,23 +64,23 @@ Expected<PointCloud> read_cloud(const std::string& path) {
   const auto *x = table->find("x"), *y = table->find("y"), *z = table->find("z");
   if (x == nullptr || y == nullptr || z == nullptr)
     return Error{path, "no columns x, y and z", "is it a point cloud?"};
-  std::vector<std::size_t> kept;
-  kept.reserve(table->rows());
+  const auto at = [&](std::size_t i) { return Eigen::Vector3d((*x)[i], (*y)[i], (*z)[i]); };
+  std::size_t kept = 0;
   Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
   for (std::size_t i = 0; i < table->rows(); ++i) {
-    const Eigen::Vector3d p((*x)[i], (*y)[i], (*z)[i]);
+    const Eigen::Vector3d p = at(i);
     if (!p.allFinite()) continue;
     if (p.cwiseAbs().maxCoeff() > kFarthest_m)
       return Error{path, text("point ", i, " (from 0) lies more than ", kFarthest_m, " m from the origin"),
                    "give metres in a local frame"};
     low = low.cwiseMin(p), high = high.cwiseMax(p);
-    kept.push_back(i);
+    ++kept;
   }
-  if (kept.empty())
+  if (kept == 0)
     return Error{path, table->rows() == 0 ? "the cloud is empty: no points" : "no point is finite",
                  "export it again"};
-  if (kept.size() < table->rows())
-    log_warning(text(path, ": ", table->rows() - kept.size(), " of ", table->rows(),
+  if (kept < table->rows())
+    log_warning(text(path, ": ", table->rows() - kept, " of ", table->rows(),
                      " points are not finite and are left out"));
   const double extent = (high - low).maxCoeff();
   if (extent > kLargest_m)
@@ -91,15 +91,17 @@ Expected<PointCloud> read_cloud(const std::string& path) {
   PointCloud cloud;
   cloud.source = path;
   cloud.anchor = (0.5 * (low + high)).array().round();
-  cloud.points.reserve(kept.size());
-  for (const std::size_t i : kept)
-    cloud.points.push_back((Eigen::Vector3d((*x)[i], (*y)[i], (*z)[i]) - cloud.anchor).cast<float>());
-  if (const auto values = grey(*table); !values.empty()) {
-    std::vector<double> of_kept(kept.size());
-    for (std::size_t k = 0; k < kept.size(); ++k)
-      of_kept[k] = std::isfinite(values[kept[k]]) ? values[kept[k]] : 0;
-    cloud.brightness = to_bytes(of_kept);
+  if (table->viewpoint) cloud.viewpoints.emplace_back(table->viewpoint->data());
+  const std::vector<double> values = grey(*table);
+  std::vector<double> of_kept;
+  cloud.points.reserve(kept);
+  for (std::size_t i = 0; i < table->rows(); ++i) {
+    const Eigen::Vector3d p = at(i);
+    if (!p.allFinite()) continue;
+    cloud.points.push_back((p - cloud.anchor).cast<float>());
+    if (!values.empty()) of_kept.push_back(std::isfinite(values[i]) ? values[i] : 0);
   }
+  if (!of_kept.empty()) cloud.brightness = to_bytes(of_kept);
   return cloud;
 }
 

@@ -148,9 +148,7 @@ Status fill_entries(const PointTable& table, std::size_t i, const std::string& p
   const auto length = not_negative(table, "length", i, path), sigma = not_negative(table, "sigma", i, path);
   if (!length) return length.error();
   if (!sigma) return sigma.error();
-  // Kinds of later versions are unknown kinds here.
-  p.kind = *kind <= static_cast<std::uint8_t>(ContourKind::limb) ? static_cast<ContourKind>(*kind)
-                                                                 : ContourKind::unknown;
+  p.kind = contour_kind(*kind);
   p.contour = std::max(*contour, -1);
   p.plane_a = std::max(*plane_a, -1);
   p.plane_b = std::max(*plane_b, -1);

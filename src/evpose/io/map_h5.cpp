@@ -217,9 +217,7 @@ Status read_contours(const Hdf5File& file, Reader& reader, ContourMap& map) {
       if (taken[start[c] + i]) return Error{where, text("row ", c, " shares points with another"), kDamaged};
       taken[start[c] + i] = true;
       points[i].contour = count[c] > 1 ? static_cast<std::int32_t>(c) : -1;
-      points[i].kind = kind[c] <= static_cast<std::uint8_t>(ContourKind::limb)
-                           ? static_cast<ContourKind>(kind[c])
-                           : ContourKind::unknown;
+      points[i].kind = contour_kind(kind[c]);
       points[i].plane_a = plane_a[c];
       points[i].plane_b = plane_b[c];
       points[i].contrast = static_cast<std::int8_t>(std::clamp<int>(contrast[c], -1, 1));

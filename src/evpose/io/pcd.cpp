@@ -27,6 +27,7 @@ struct Field {
 struct Header {
   std::vector<Field> fields;
   std::int64_t points = -1, width = -1, height = 1;
+  std::optional<std::array<double, 3>> viewpoint;
   std::string data;  ///< ascii, binary or binary_compressed
 
   std::size_t row_bytes() const {
@@ -73,7 +74,15 @@ bool is_known(const Field& f) {
 /// One line of the header; false when it is not understood.
 bool add_header_line(const std::vector<std::string_view>& words, Header& header) {
   const std::string_view key = words[0];
-  if (key == "VERSION" || key == "VIEWPOINT") return true;
+  if (key == "VERSION") return true;
+  if (key == "VIEWPOINT") {
+    std::array<double, 3> at{};
+    bool known = words.size() >= 4;
+    for (std::size_t k = 0; k < 3 && known; ++k)
+      known = parse_number(words[k + 1], at[k]) && std::isfinite(at[k]);
+    if (known && at != std::array<double, 3>{}) header.viewpoint = at;
+    return true;
+  }
   if (key == "FIELDS") {
     for (std::size_t i = 1; i < words.size(); ++i) header.fields.push_back({.name = std::string(words[i])});
     return words.size() > 1;
@@ -269,6 +278,7 @@ Expected<PointTable> read_pcd(const std::string& path) {
   const auto header = read_header(*lines, path);
   if (!header) return header.error();
   PointTable table = empty_table(*header);
+  table.viewpoint = header->viewpoint;
   Status status;
   if (header->data == "ascii") {
     status = read_ascii(*lines, *header, table);

@@ -193,14 +193,21 @@ Status write_obj_map(const std::string& path, const ContourMap& map) {
   const auto vertex = [&](const Eigen::Vector3d& p) {
     file->write(text("v ", p.x(), " ", p.y(), " ", p.z(), "\n"));
   };
-  file->write("# map frame, metres\no contours\n");
+  file->write("# map frame, metres\n");
   std::size_t next = 1;
-  for (std::size_t i = 0; i < map.points.size(); ++i, next += 2) {
-    const Eigen::Vector3d half =
-        0.5 * static_cast<double>(map.points[i].length) * map.points[i].tangent.cast<double>();
-    vertex(map.position(i) - half);
-    vertex(map.position(i) + half);
-    file->write(text("l ", next, " ", next + 1, "\n"));
+  for (std::size_t kind = 0; kind < kContourKinds; ++kind) {
+    bool first = true;
+    for (std::size_t i = 0; i < map.points.size(); ++i) {
+      if (map.points[i].kind != static_cast<ContourKind>(kind)) continue;
+      if (first) file->write(text("o contours_", kContourKindNames[kind], "\n"));
+      first = false;
+      const Eigen::Vector3d half =
+          0.5 * static_cast<double>(map.points[i].length) * map.points[i].tangent.cast<double>();
+      vertex(map.position(i) - half);
+      vertex(map.position(i) + half);
+      file->write(text("l ", next, " ", next + 1, "\n"));
+      next += 2;
+    }
   }
   file->write("o outlines\n");
   for (const MapPolygon& polygon : map.polygons) {

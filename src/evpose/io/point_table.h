@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +12,8 @@ namespace evpose {
 /// Columns of numbers by name, as point files hold them.
 struct PointTable {
   std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;  ///< one for each name, all of equal length
+  std::vector<std::vector<double>> columns;        ///< one for each name, all of equal length
+  std::optional<std::array<double, 3>> viewpoint;  ///< where a scanner stood, if the file says so
 
   std::size_t rows() const { return columns.empty() ? 0 : columns.front().size(); }
   /// The column, or nullptr.

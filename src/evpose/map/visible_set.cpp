@@ -115,8 +115,8 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
     const Eigen::Vector3f& p = map.points[i].position;
     keys[i] = {key_of(p, cube_m_ * kBlockCubes), key_of(p, cube_m_)};
   }
-  order_.resize(n);
-  std::iota(order_.begin(), order_.end(), 0u);
+  for (std::uint32_t i = 0; i < n; ++i)
+    if (!is_mark(map.points[i].kind)) order_.push_back(i);
   std::sort(order_.begin(), order_.end(), [&keys](std::uint32_t a, std::uint32_t b) {
     if (keys[a].block != keys[b].block) return keys[a].block < keys[b].block;
     if (keys[a].cube != keys[b].cube) return keys[a].cube < keys[b].cube;
@@ -125,9 +125,10 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
   const auto position = [&](std::uint32_t i) -> const Eigen::Vector3f& {
     return map_.points[order_[i]].position;
   };
-  for (std::uint32_t begin = 0; begin < n;) {
+  const auto count = static_cast<std::uint32_t>(order_.size());
+  for (std::uint32_t begin = 0; begin < count;) {
     std::uint32_t block_end = begin;
-    while (block_end < n && keys[order_[block_end]].block == keys[order_[begin]].block) ++block_end;
+    while (block_end < count && keys[order_[block_end]].block == keys[order_[begin]].block) ++block_end;
     const Sphere whole = bound(begin, block_end, position);
     const auto first_cube = static_cast<std::uint32_t>(cubes_.size());
     for (std::uint32_t i = begin; i < block_end;) {

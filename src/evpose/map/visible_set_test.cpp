@@ -64,6 +64,19 @@ TEST_F(VisibleLaws, IndexFindsWhatBruteForceFinds) {
   }
 }
 
+TEST_F(VisibleLaws, MarksAreInNoCube) {
+  ContourMap marked = map_;
+  std::set<std::uint32_t> others;
+  for (std::uint32_t i = 0; i < marked.points.size(); ++i) {
+    if (i % 3 != 2) marked.points[i].kind = i % 3 == 0 ? ContourKind::limb : ContourKind::shadow;
+    if (i % 3 == 2) others.insert(i);
+  }
+  const ContourIndex index(marked);
+  EXPECT_EQ(std::set<std::uint32_t>(index.order().begin(), index.order().end()), others);
+  for (ContourPoint& p : marked.points) p.kind = ContourKind::shadow;
+  EXPECT_TRUE(ContourIndex(marked).cubes().empty());
+}
+
 TEST_F(VisibleLaws, ChosenOrBesideAChosenPointIsExactlyTheFrustum) {
   VisibleSetConfig config;
   config.far_m = 6;

@@ -2,102 +2,112 @@
 #include "evpose/map_build/boundaries.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
-#include "evpose/map_build/section_fit.h"
+#include "evpose/core/parallel.h"
+#include "evpose/map_build/arcs.h"
+#include "evpose/map_build/edge_fit.h"
 #include "evpose/map_build/strips.h"
+#include "evpose/map_build/view_points.h"
 
 namespace evpose::map_build {
 namespace {
 
-constexpr double kMovedByBlur = 0.3;
-constexpr double kWindow = 2.5;            // noise: half width of what is taken for one surface
-constexpr double kReachNoise = 4;          // noise: of what is looked at around an edge
-constexpr double kFewestHanging = 8;       // points of a second face
-constexpr double kLeastHanging = 0.3;      // ... and its density, as a share of the plane's
-constexpr double kMostUnexplained = 0.1;   // share of the points at an edge that no surface there explains
-constexpr double kMostDepthSigma = 0.3;    // noise: of the far edge of a narrow face
-constexpr double kLeastDepth = 1.5;        // noise: of a face whose edges are told apart ...
-constexpr double kMostDepth = 3.5;         // ... and of one too narrow for a plane of its own
-constexpr double kLeastGain = 10;          // of log likelihood, by a second face
-constexpr double kHigh = 1.2;              // noise: few of the plane's points are further from it
-constexpr double kDenser = 1.5;            // ... and over the plane's density
-constexpr double kExcess = 3;              // sigma: of points at the edge over chance
-constexpr std::size_t kMostPoints = 1200;  // for one edge
-constexpr double kUneven = 0.1;            // noise: that many points do not average away
-constexpr double kMostRest = 0.12;         // density beyond a free edge, as a share of that within
+constexpr double kMostDepthSigma = 0.3;  // noise: of the far edge of a narrow face
+constexpr double kLeastDepth = 1.5;      // noise: of a face whose edges are told apart ...
+constexpr double kMostDepth = 3.5;       // ... and of one too narrow for a plane of its own
+constexpr double kUneven = 0.1;          // noise: that many points do not average away
+constexpr double kArcPart_m = 0.02;      // straight pieces that an arc is written in
+constexpr double kFewestChunks = 3;      // of an arc, each fitted on its own ...
+constexpr double kLeastGain = 4;         // of log likelihood, by an arc over lines
+constexpr double kMostChunkSigma = 3;    // ... to so much worse than the arc must be known
 
 double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane);
 
+/// What became of a part of an outline.
+struct Traced {
+  std::vector<Piece> pieces;
+  double left_out_m = 0;
+};
+
 class BoundaryFinder {
  public:
-  BoundaryFinder(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane,
-                 const Outline& outline, const std::vector<Piece>& creases, const BoundaryConfig& config)
-      : surface_(surface),
-        tree_(tree),
-        plane_(plane),
-        frame_(plane),
-        outline_(outline),
-        creases_(creases),
-        config_(config) {
-    free_side_ = side_of_the_rest(surface, plane);
-  }
+  BoundaryFinder(const BoundaryInput& input, std::size_t number, const BoundaryConfig& config)
+      : surface_(input.surface),
+        tree_(input.tree),
+        views_(input.views),
+        plane_(input.planes.planes[number]),
+        number_(static_cast<std::int32_t>(number)),
+        outline_(input.outlines[number]),
+        creases_(input.creases[number]),
+        config_(config),
+        fitter_(input.surface, input.tree, plane_, outline_.cell_m, config.most_blur_noise),
+        free_side_(side_of_the_rest(input.surface, plane_)) {}
 
-  Boundaries find(std::int32_t number) const;
+  std::vector<Piece> arcs(const Ring& ring) const;
+  Traced side(const Ring& ring, std::size_t number, const std::vector<Piece>& arcs) const;
 
  private:
-  struct Edge {
-    Eigen::Vector2d middle, along, out;  ///< in the plane's frame
-    double half_length;
-    /// Outwards, and turned by a slope; the surface is on the left.
-    void shift(double place, double slope) {
-      middle += place * out;
-      along = (along + slope * out).normalized();
-      out = {along.y(), -along.x()};
-    }
-  };
-  std::vector<Eigen::Vector3d> local_points(const Edge& edge, double reach) const;
-  struct OwnPoints {
-    std::vector<Eigen::Vector3d> points;  ///< along, outwards, over the plane
-    bool one_side = false;                ///< only those on one side of the plane
-  };
-  OwnPoints own_points(const std::vector<Eigen::Vector3d>& local, double half_width) const;
-  static StepFit likeliest(const std::vector<Eigen::Vector3d>& points, double half_length, double half_width,
-                           double shear, std::span<const double> blurs);
-  std::optional<SectionFit> second_face(const Edge& edge) const;
-  bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
+  const PlaneFrame& frame() const { return fitter_.frame(); }
+  double sigma_m(const FittedEdge& fitted, const Eigen::Vector3d& at) const;
+  double least_side_m() const { return std::max(config_.least_length_m, 3 * outline_.cell_m); }
+  bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std::vector<Piece>& pieces) const;
+  std::pair<Eigen::Vector2d, Eigen::Vector2d> without(const std::vector<Piece>& arcs,
+                                                      const Eigen::Vector2d& a,
+                                                      const Eigen::Vector2d& b) const;
   bool goes_on(const Piece& piece) const;
   bool covered(const Piece& piece) const;
-  StepFit settle(Edge& edge) const;
+  bool hidden(const Piece& piece) const;
+  bool is_edge(const FittedEdge& fitted, const Piece& piece) const;
   std::optional<Piece> far_edge(const Piece& near, const SectionFit& section) const;
-  void fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::int32_t number,
-           std::vector<Piece>& out) const;
+  std::vector<Piece> pieces_along(const FittedEdge& fitted) const;
+  void add_arc(const Ring& ring, const ArcStretch& stretch, std::vector<Piece>& out) const;
 
   const SurfacePoints& surface_;
   const Neighbours& tree_;
+  std::span<const View> views_;
   const FittedPlane& plane_;
-  PlaneFrame frame_;
+  std::int32_t number_;
   const Outline& outline_;
   const std::vector<Piece>& creases_;
   const BoundaryConfig& config_;
-  double free_side_ = 0;
+  EdgeFitter fitter_;
+  double free_side_;
 };
 
-/// Half or more of the side lies along a crease.
-bool BoundaryFinder::explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const {
+/// Half or more of the side lies along pieces that were found.
+bool BoundaryFinder::explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                               const std::vector<Piece>& pieces) const {
   const double reach = 1.5 * outline_.cell_m + 2 * surface_.scale.noise_m;
   constexpr int kProbes = 8;
   int near = 0;
   for (int k = 0; k < kProbes; ++k) {
-    const Eigen::Vector3d x = frame_.lift(a + (b - a) * ((k + 0.5) / kProbes));
-    near += std::any_of(creases_.begin(), creases_.end(),
+    const Eigen::Vector3d x = frame().lift(a + (b - a) * ((k + 0.5) / kProbes));
+    near += std::any_of(pieces.begin(), pieces.end(),
                         [&](const Piece& piece) { return distance(piece, x) < reach; })
                 ? 1
                 : 0;
   }
   return near >= kProbes / 2;
+}
+
+/// The longest part of a side that no arc runs along.
+std::pair<Eigen::Vector2d, Eigen::Vector2d> BoundaryFinder::without(const std::vector<Piece>& arcs,
+                                                                    const Eigen::Vector2d& a,
+                                                                    const Eigen::Vector2d& b) const {
+  if (arcs.empty()) return {a, b};
+  constexpr int kParts = 32;
+  int first = 0, count = 0;
+  for (int begin = 0; begin < kParts;) {
+    int end = begin;
+    while (end < kParts && !explained(a + (b - a) * end / kParts, a + (b - a) * (end + 1) / kParts, arcs))
+      ++end;
+    if (end - begin > count) first = begin, count = end - begin;
+    begin = end + 1;
+  }
+  return {a + (b - a) * first / kParts, a + (b - a) * (first + count) / kParts};
 }
 
 /// Points in the plane beyond the edge: it is none, only a change of density or of the plane's number.
@@ -144,6 +154,20 @@ bool BoundaryFinder::covered(const Piece& piece) const {
   return hit > kProbes / 2;
 }
 
+/// Nobody could see whether the surface goes on beyond the edge: something stands before it.
+bool BoundaryFinder::hidden(const Piece& piece) const {
+  constexpr int kProbes = 8;
+  const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
+  const double margin = std::max({0.05, 3 * plane_.spacing_m, 5 * surface_.scale.noise_m});
+  int hit = 0;
+  for (int k = 0; k < kProbes; ++k) {
+    const Eigen::Vector3d x =
+        piece.begin + (piece.end - piece.begin) * ((k + 0.5) / kProbes) + 1.6 * reach * piece.normal_a;
+    hit += hidden_from_all(views_, x, plane_, margin) ? 1 : 0;
+  }
+  return hit > kProbes / 2;
+}
+
 /// Side of the plane that nearly all other points of the cloud lie on; 0 if there is none.
 double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) {
   constexpr double kAway_m = 0.1, kNearlyAll = 0.9;
@@ -156,110 +180,6 @@ double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) 
   }
   if (above > kNearlyAll * (above + below)) return 1;
   return below > kNearlyAll * (above + below) ? -1 : 0;
-}
-
-/// All points of the cloud near an edge in its coordinates: along it, outwards, over the plane.
-std::vector<Eigen::Vector3d> BoundaryFinder::local_points(const Edge& edge, double reach) const {
-  const Eigen::Vector3d begin = frame_.lift(edge.middle - edge.half_length * edge.along);
-  const Eigen::Vector3d end = frame_.lift(edge.middle + edge.half_length * edge.along);
-  std::vector<Eigen::Vector3d> out = points_around(surface_, tree_, begin, end, reach);
-  for (Eigen::Vector3d& x : out) {
-    const Eigen::Vector2d flat = frame_.flat(x) - edge.middle;
-    x = {edge.along.dot(flat), edge.out.dot(flat), plane_.distance(x)};
-  }
-  return out;
-}
-
-/// Points of the plane beside an edge. A narrow face that hangs from the edge lies on one side of the plane,
-/// and its points near the edge pass for the plane's; those on the other side are the plane's own. Told from
-/// the points too high for most of the plane's: they stand at the edge in excess, on that side only.
-BoundaryFinder::OwnPoints BoundaryFinder::own_points(const std::vector<Eigen::Vector3d>& local,
-                                                     double half_width) const {
-  const double noise = surface_.scale.noise_m;
-  OwnPoints out;
-  std::vector<Eigen::Vector3d> half[2];
-  double at_edge[2] = {0, 0}, within[2] = {0, 0};
-  for (const auto& p : local) {
-    if (std::abs(p.z()) > kWindow * noise || std::abs(p.y()) > half_width) continue;
-    const int side = p.z() > 0 ? 1 : 0;
-    out.points.push_back(p);
-    half[side].push_back(p);
-    if (std::abs(p.z()) < kHigh * noise || p.y() > kWindow * noise) continue;
-    (p.y() > -kWindow * noise ? at_edge : within)[side] += 1;
-  }
-  const double expected = within[0] + within[1] > 0 ? within[1] / (within[0] + within[1]) : 0.5;
-  const double edge = at_edge[0] + at_edge[1];
-  const double sigma = std::sqrt(std::max(edge * expected * (1 - expected), 1.0));
-  const double excess = at_edge[1] - edge * expected;
-  const int fuller = excess > 0 ? 1 : 0;
-  // More than the plane would have if it went on: seen askew it ends later on one side, but is no denser.
-  const double plane_has =
-      within[fuller] / std::max(half_width - kWindow * noise, noise) * 2 * kWindow * noise;
-  if (std::abs(excess) > kExcess * sigma && at_edge[fuller] > kDenser * plane_has) {
-    out.points = std::move(half[1 - fuller]);
-    out.one_side = true;
-  }
-  if (out.points.size() > kMostPoints) {
-    const std::size_t step = out.points.size() / kMostPoints + 1;
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < out.points.size(); k += step) out.points[kept++] = out.points[k];
-    out.points.resize(kept);
-  }
-  return out;
-}
-
-/// The likeliest step for some softnesses; seen askew, noise along the ray shifts points outwards as it lifts
-/// them: `shear` is metres outwards per metre of height.
-StepFit BoundaryFinder::likeliest(const std::vector<Eigen::Vector3d>& points, double half_length,
-                                  double half_width, double shear, std::span<const double> blurs) {
-  std::vector<Eigen::Vector2d> flat;
-  flat.reserve(points.size());
-  for (const auto& p : points) flat.emplace_back(p.x(), p.y() - shear * p.z());
-  StepFit best;
-  best.log_likelihood = -INFINITY;
-  for (const double blur : blurs) {
-    const StepFit step = fit_step(flat, half_length, half_width, blur);
-    if (step.converged && step.log_likelihood > best.log_likelihood) best = step;
-  }
-  return best;
-}
-
-/// The second face that begins at the edge, and where that puts it; `side` is 0 if there is none. Nothing if
-/// there is something that is no face, or more than faces: what ends where is open.
-std::optional<SectionFit> BoundaryFinder::second_face(const Edge& edge) const {
-  const double noise = surface_.scale.noise_m;
-  const SectionWindow window = section_window(edge.half_length, noise, plane_.rms_m, plane_.spacing_m);
-  const SectionFit section =
-      fit_section(local_points(edge, std::hypot(window.half_width, window.half_height)), window);
-  const bool likelier = section.side != 0 && section.gain >= kLeastGain;
-  const double on_face = section.face * 2 * edge.half_length * section.depth;
-  const bool dense = on_face >= kFewestHanging && section.face >= kLeastHanging * section.plane;
-  if (likelier && (!dense || section.rest_share > kMostUnexplained)) return {};
-  return likelier ? section : SectionFit{};
-}
-
-/// Moves the edge to where the plane's density falls off; not converged where that is too soft for an edge.
-StepFit BoundaryFinder::settle(Edge& edge) const {
-  const double noise = surface_.scale.noise_m, half_width = 2.5 * outline_.cell_m;
-  const double softest = std::max(noise, 0.3 * plane_.spacing_m);
-  StepFit best;
-  for (int round = 0; round < 2; ++round) {
-    const OwnPoints own =
-        own_points(local_points(edge, std::hypot(half_width, kReachNoise * noise)), half_width);
-    // The softness of the edge: that which makes the points likeliest.
-    const std::array<double, 5> blurs = {0.25 * softest, 0.5 * softest, softest, 2 * softest, 4 * softest};
-    best = likeliest(own.points, edge.half_length, half_width, 0, blurs);
-    if (!best.converged) return best;
-    if (round == 1 && !own.one_side)
-      for (const double shear : {-1.0, -0.5, 0.5, 1.0}) {
-        const std::array<double, 2> sharper = {best.blur_m, 0.6 * best.blur_m};
-        const StepFit step = likeliest(own.points, edge.half_length, half_width, shear, sharper);
-        if (step.converged && step.log_likelihood > best.log_likelihood) best = step;
-      }
-    edge.shift(best.place, best.slope);
-  }
-  best.converged = best.blur_m <= config_.most_blur_noise * softest;
-  return best;
 }
 
 /// Of a second face too narrow for a plane of its own.
@@ -276,67 +196,226 @@ std::optional<Piece> BoundaryFinder::far_edge(const Piece& near, const SectionFi
   return far;
 }
 
-void BoundaryFinder::fit(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::int32_t number,
-                         std::vector<Piece>& out) const {
-  Edge edge{0.5 * (a + b), (b - a).normalized(), Eigen::Vector2d::Zero(), 0.5 * (b - a).norm()};
-  edge.shift(0, 0);
-  const double noise = surface_.scale.noise_m;
-  const StepFit best = settle(edge);
-  if (!best.converged) return;
-  double across = std::hypot(best.sigma_place, 0.5 * edge.half_length * best.sigma_slope);
-  double moved = kMovedByBlur * best.blur_m, height = 0;  // what blurs a free edge also moves it
-  const double uneven = std::max(kUneven * noise, plane_.uneven_m);
-  const std::optional<SectionFit> section = second_face(edge);
-  if (!section) return;
-  const int side = section->side;
-  if (side != 0) {
-    height = section->height;
-    across = std::hypot(section->sigma_place, uneven);
-    moved = std::hypot(section->sigma_height, uneven);
-    edge.shift(section->place, section->slope);
-  } else if (best.rest > kMostRest) {
-    return;
-  }
-  const auto lifted = [&](double t, double over) -> Eigen::Vector3d {
-    return frame_.lift(edge.middle + t * edge.half_length * edge.along) + over * plane_.normal;
-  };
-  Piece piece;
-  piece.plane_a = number;
-  piece.kind = side != 0 ? ContourKind::crease : ContourKind::boundary;
-  piece.begin = lifted(-1, height);
-  piece.end = lifted(1, height);
-  piece.normal_a = edge.out.x() * frame_.first + edge.out.y() * frame_.second;
-  if (side != 0) piece.normal_b = -side * plane_.normal;
-  const double off = std::hypot(plane_.sigma_at(0.5 * (piece.begin + piece.end)), uneven);
-  piece.sigma_m = std::sqrt((across * across + moved * moved + off * off) / 2);
-  if (across > config_.most_sigma_m || goes_on(piece) || covered(piece)) return;
-  const double reach = std::max(2.5 * plane_.spacing_m, 2 * noise);
-  if (side != 0 && stands_before(tree_, piece, reach, reach)) return;
-  out.push_back(piece);
-  if (const auto far = far_edge(piece, *section)) out.push_back(*far);
+double BoundaryFinder::sigma_m(const FittedEdge& fitted, const Eigen::Vector3d& at) const {
+  const double uneven = std::max(kUneven * surface_.scale.noise_m, plane_.uneven_m);
+  const double off = std::hypot(plane_.sigma_at(at), uneven);
+  return std::sqrt((fitted.across_m * fitted.across_m + fitted.moved_m * fitted.moved_m + off * off) / 2);
 }
 
-Boundaries BoundaryFinder::find(std::int32_t number) const {
-  Boundaries out;
-  for (const Ring& ring : outline_.rings) {
-    for (std::size_t k = 0; k < ring.coarse.size(); ++k) {
-      const Eigen::Vector2d &a = ring.coarse[k], &b = ring.coarse[(k + 1) % ring.coarse.size()];
-      const double length = (b - a).norm();
-      if (explained(a, b)) continue;
-      const std::size_t before = out.pieces.size();
-      if (length >= std::max(config_.least_length_m, 3 * outline_.cell_m)) fit(a, b, number, out.pieces);
-      if (out.pieces.size() == before) out.shadow_m += length;
+/// A straight edge is one piece; an arc many, each touching it in its middle.
+std::vector<Piece> BoundaryFinder::pieces_along(const FittedEdge& fitted) const {
+  const Edge& edge = fitted.edge;
+  const int side = fitted.section.side;
+  const int parts =
+      edge.bend == 0 ? 1 : std::max(1, static_cast<int>(std::ceil(2 * edge.half_length / kArcPart_m)));
+  std::vector<Piece> out;
+  for (int k = 0; k < parts; ++k) {
+    const double t = edge.half_length * ((2 * k + 1.0) / parts - 1);
+    const Eigen::Vector2d along = edge.along_at(t);
+    const Eigen::Vector2d across(along.y(), -along.x()), half = edge.half_length / parts * along;
+    const auto lifted = [&](const Eigen::Vector2d& p) -> Eigen::Vector3d {
+      return frame().lift(p) + (side != 0 ? fitted.section.height : 0) * plane_.normal;
+    };
+    Piece piece;
+    piece.plane_a = number_;
+    piece.kind = side != 0 ? ContourKind::crease : ContourKind::boundary;
+    piece.begin = lifted(edge.at(t) - half);
+    piece.end = lifted(edge.at(t) + half);
+    piece.normal_a = across.x() * frame().first + across.y() * frame().second;
+    if (side != 0) piece.normal_b = -side * plane_.normal;
+    piece.sigma_m = sigma_m(fitted, 0.5 * (piece.begin + piece.end));
+    out.push_back(piece);
+  }
+  return out;
+}
+
+/// `piece`: where it would be, straight.
+bool BoundaryFinder::is_edge(const FittedEdge& fitted, const Piece& piece) const {
+  if (fitted.verdict != FittedEdge::Verdict::sharp) return false;
+  if (goes_on(piece)) return false;
+  const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
+  return fitted.section.side == 0 || !stands_before(tree_, piece, reach, reach);
+}
+
+Traced BoundaryFinder::side(const Ring& ring, std::size_t number, const std::vector<Piece>& arcs) const {
+  const Eigen::Vector2d &from = ring.coarse[number], &to = ring.coarse[(number + 1) % ring.coarse.size()];
+  if (explained(from, to, creases_)) return {};
+  const auto [a, b] = without(arcs, from, to);
+  const Traced left_out{{}, (b - a).norm()};
+  if (left_out.left_out_m < least_side_m()) return left_out;
+  const auto shadow = [&](Piece piece) {
+    piece.kind = ContourKind::shadow;
+    piece.sigma_m = outline_.cell_m;
+    piece.normal_b.setZero();
+    return Traced{{piece}, 0};
+  };
+  FittedEdge fitted;
+  fitted.edge = Edge::between(a, b);
+  const Piece as_traced = pieces_along(fitted).front();
+  if (hidden(as_traced)) return shadow(as_traced);
+  fitted = fitter_.fit(fitted.edge);
+  if (fitted.verdict == FittedEdge::Verdict::soft) return shadow(as_traced);
+  const Piece piece = pieces_along(fitted).front();
+  if (fitted.across_m > config_.most_sigma_m || !is_edge(fitted, piece)) return left_out;
+  if (views_.empty() && covered(piece)) return shadow(piece);
+  Traced out{{piece}, 0};
+  if (const auto far = far_edge(piece, fitted.section)) out.pieces.push_back(*far);
+  return out;
+}
+
+/// An arc around `angle` that turns by `turn_rad`; `direction`: +1 where the surface is inside the circle.
+Edge arc_edge(const Circle& circle, double angle, double direction, double turn_rad) {
+  const Eigen::Vector2d outwards(std::cos(angle), std::sin(angle)), out = direction * outwards;
+  return {circle.centre + circle.radius_m * outwards,
+          {-out.y(), out.x()},
+          out,
+          0.5 * turn_rad * circle.radius_m,
+          direction / circle.radius_m};
+}
+
+/// Fits the chunks of a stretch one by one, a circle through them, and keeps it where it is likelier than
+/// the straight sides of the ring.
+void BoundaryFinder::add_arc(const Ring& ring, const ArcStretch& stretch, std::vector<Piece>& out) const {
+  const std::size_t n = ring.steps.size();
+  const double direction = [&] {  // of the ring around the circle's centre
+    const Eigen::Vector2d a = ring.steps[stretch.first] - stretch.circle.centre;
+    const Eigen::Vector2d b = ring.steps[(stretch.first + stretch.count / 4) % n] - stretch.circle.centre;
+    return a.x() * b.y() - a.y() * b.x() > 0 ? 1.0 : -1.0;
+  }();
+  const auto angle_of = [&](std::size_t k) {
+    const Eigen::Vector2d d = ring.steps[(stretch.first + k) % n] - stretch.circle.centre;
+    return std::atan2(d.y(), d.x());
+  };
+  double turn = 0;
+  for (std::size_t k = 0; k + 1 < stretch.count; ++k)
+    turn += std::remainder(angle_of(k + 1) - angle_of(k), 2 * M_PI);
+  const double length = std::abs(turn) * stretch.circle.radius_m;
+  const double chunk_m = std::max(config_.least_length_m, 2.5 * outline_.cell_m);
+  const int chunks = static_cast<int>(length / chunk_m);
+  if (chunks < kFewestChunks) return;
+  std::vector<FittedEdge> fitted;
+  std::vector<CurvePlace> places;
+  std::vector<int> line_of;
+  for (int k = 0; k < chunks; ++k) {
+    const double angle = angle_of(0) + turn * (k + 0.5) / chunks;
+    const Edge edge = arc_edge(stretch.circle, angle, direction, std::abs(turn) / chunks);
+    const FittedEdge found = fitter_.fit(edge);
+    Edge straight = found.edge;
+    straight.bend = 0;
+    FittedEdge for_tests = found;
+    for_tests.edge = straight;
+    const Piece piece = pieces_along(for_tests).front();
+    if (found.across_m > kMostChunkSigma * config_.most_sigma_m || !is_edge(found, piece)) continue;
+    if (views_.empty() ? covered(piece) : hidden(piece)) continue;
+    // Each chunk tells two places of the curve; the nearest straight side is the line they would be on.
+    for (const double t : {-0.5, 0.5}) {
+      const Eigen::Vector2d place = found.edge.at(t * edge.half_length);
+      places.push_back({place, std::sqrt(2.0) * found.across_m});
+      double least = INFINITY;
+      int line = 0;
+      for (std::size_t s = 0; s < ring.coarse.size(); ++s) {
+        const Eigen::Vector2d &a = ring.coarse[s], &b = ring.coarse[(s + 1) % ring.coarse.size()];
+        const double share = std::clamp((place - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+        const double off = (place - a - share * (b - a)).norm();
+        if (off < least) least = off, line = static_cast<int>(s);
+      }
+      line_of.push_back(line);
     }
+    fitted.push_back(found);
+  }
+  if (static_cast<double>(fitted.size()) < std::max(kFewestChunks, 0.5 * chunks)) return;
+  const auto run = likeliest_arc(places, line_of, 2 * static_cast<std::size_t>(kFewestChunks));
+  if (!run || run->gain < kLeastGain) return;
+  const Circle& circle = run->circle;
+  // All points along the run once more, together: a short chunk is drawn inwards by having few.
+  const auto chunks_of_run = std::span(fitted).subspan(run->first / 2, run->count / 2);
+  const auto angle_on = [&](const FittedEdge& chunk) {
+    const Eigen::Vector2d d = chunk.edge.middle - circle.centre;
+    return std::atan2(d.y(), d.x());
+  };
+  double run_turn = 0;
+  for (std::size_t k = 0; k + 1 < chunks_of_run.size(); ++k)
+    run_turn += std::remainder(angle_on(chunks_of_run[k + 1]) - angle_on(chunks_of_run[k]), 2 * M_PI);
+  run_turn += std::copysign(2 * fitted.front().edge.half_length / circle.radius_m, run_turn);
+  if (std::abs(run_turn) > 2 * M_PI) run_turn = std::copysign(2 * M_PI, run_turn);
+  const double middle = angle_on(chunks_of_run.front()) + 0.5 * run_turn -
+                        std::copysign(fitted.front().edge.half_length / circle.radius_m, run_turn);
+  const FittedEdge whole = fitter_.fit(arc_edge(circle, middle, direction, std::abs(run_turn)));
+  if (whole.verdict != FittedEdge::Verdict::sharp || whole.across_m > config_.most_sigma_m) return;
+  for (const Piece& piece : pieces_along(whole)) {
+    const Eigen::Vector2d at = frame().flat(0.5 * (piece.begin + piece.end));
+    // Where its chunk was no edge, the arc has a gap.
+    if (std::any_of(chunks_of_run.begin(), chunks_of_run.end(), [&](const FittedEdge& chunk) {
+          return std::abs(chunk.edge.local(at).x()) <= chunk.edge.half_length;
+        }))
+      out.push_back(piece);
+  }
+}
+
+std::vector<Piece> BoundaryFinder::arcs(const Ring& ring) const {
+  std::vector<Piece> out;
+  const double least_m = kFewestChunks * std::max(config_.least_length_m, 2.5 * outline_.cell_m);
+  for (const ArcStretch& stretch : find_arcs(ring.steps, outline_.cell_m, least_m)) {
+    std::vector<Piece> arc;
+    add_arc(ring, stretch, arc);
+    std::erase_if(arc, [&](const Piece& piece) {
+      return explained(frame().flat(piece.begin), frame().flat(piece.end), creases_);
+    });
+    for (Piece& piece : arc) piece.chain = static_cast<std::int32_t>(out.size());
+    out.insert(out.end(), arc.begin(), arc.end());
   }
   return out;
 }
 
 }  // namespace
 
-Boundaries find_boundaries(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane,
-                           std::int32_t number, const Outline& outline, const std::vector<Piece>& creases,
-                           const BoundaryConfig& config) {
-  return BoundaryFinder(surface, tree, plane, outline, creases, config).find(number);
+std::vector<Boundaries> find_boundaries(const BoundaryInput& input, const BoundaryConfig& config,
+                                        ThreadPool& pool) {
+  const std::size_t planes = input.planes.planes.size();
+  std::vector<std::optional<BoundaryFinder>> finders(planes);
+  pool.for_chunks(planes, 8, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p)
+      if (!input.unfit[p]) finders[p].emplace(input, p, config);
+  });
+  // Large planes have most of the outlines: the work is shared out by rings, then by sides.
+  struct Task {
+    std::size_t plane, ring, side;
+  };
+  std::vector<Task> rings, sides;
+  std::vector<std::vector<std::vector<Piece>>> arcs(planes);
+  for (std::size_t p = 0; p < planes; ++p) {
+    if (!finders[p]) continue;
+    arcs[p].resize(input.outlines[p].rings.size());
+    for (std::size_t r = 0; r < input.outlines[p].rings.size(); ++r) {
+      rings.push_back({p, r, 0});
+      for (std::size_t s = 0; s < input.outlines[p].rings[r].coarse.size(); ++s) sides.push_back({p, r, s});
+    }
+  }
+  pool.for_chunks(rings.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+    const auto& [p, r, s] = rings[k];
+    arcs[p][r] = finders[p]->arcs(input.outlines[p].rings[r]);
+  });
+  std::vector<Traced> traced(sides.size());
+  pool.for_chunks(sides.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto& [p, r, s] = sides[k];
+      traced[k] = finders[p]->side(input.outlines[p].rings[r], s, arcs[p][r]);
+    }
+  });
+  std::vector<Boundaries> out(planes);
+  for (std::size_t k = 0; k < rings.size(); ++k) {
+    const auto& [p, r, s] = rings[k];
+    for (Piece& piece : arcs[p][r]) {
+      piece.chain += static_cast<std::int32_t>(r) * 1'000'000;
+      out[p].pieces.push_back(piece);
+    }
+  }
+  for (std::size_t k = 0; k < sides.size(); ++k) {
+    Boundaries& of = out[sides[k].plane];
+    of.pieces.insert(of.pieces.end(), traced[k].pieces.begin(), traced[k].pieces.end());
+    of.left_out_m += traced[k].left_out_m;
+  }
+  return out;
 }
 
 }  // namespace evpose::map_build

@@ -2,14 +2,20 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "evpose/map_build/neighbours.h"
 #include "evpose/map_build/outlines.h"
 #include "evpose/map_build/piece.h"
-#include "evpose/map_build/step_fit.h"
+
+namespace evpose {
+class ThreadPool;
+}
 
 namespace evpose::map_build {
+
+class View;
 
 struct BoundaryConfig {
   double least_length_m = 0.12;  ///< of a piece
@@ -17,15 +23,25 @@ struct BoundaryConfig {
   double most_blur_noise = 2;    ///< a real edge is no softer than so many times the noise; a shadow's is
 };
 
-struct Boundaries {
-  std::vector<Piece> pieces;
-  double shadow_m = 0;  ///< length of outlines left out: soft, or where the surface goes on
+/// What boundaries are found from; references and views must outlive the call.
+struct BoundaryInput {
+  const SurfacePoints& surface;
+  const Neighbours& tree;  ///< finds the cloud's points
+  const Planes& planes;
+  const std::vector<bool>& unfit;                  ///< planes that have no contours
+  const std::vector<Outline>& outlines;            ///< of the planes
+  const std::vector<std::vector<Piece>>& creases;  ///< of the planes
+  std::span<const View> views;                     ///< where the cloud was seen from, if that is known
 };
 
-/// Pieces of a plane's outline that no crease explains and that end like an edge. `creases` are those of the
-/// plane; `tree` finds the cloud's points.
-Boundaries find_boundaries(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane,
-                           std::int32_t number, const Outline& outline, const std::vector<Piece>& creases,
-                           const BoundaryConfig& config);
+struct Boundaries {
+  std::vector<Piece> pieces;  ///< edges, arcs in chains of short pieces, and shadows
+  double left_out_m = 0;      ///< length of outlines left out: short, or unsure
+};
+
+/// For each plane the pieces of its outline that no crease explains and that end like an edge, or that are
+/// shadows: soft, or with something standing before what is beyond them.
+std::vector<Boundaries> find_boundaries(const BoundaryInput& input, const BoundaryConfig& config,
+                                        ThreadPool& pool);
 
 }  // namespace evpose::map_build

@@ -7,43 +7,18 @@
 #include <limits>
 #include <random>
 
-#include "evpose/core/parallel.h"
 #include "evpose/io/map_h5.h"
 #include "evpose/io/test_files.h"
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/gravity.h"
-#include "evpose/map_build/map_builder.h"
+#include "evpose/map_build/neighbours.h"
 #include "evpose/map_build/section_fit.h"
+#include "evpose/map_build/step_fit.h"
+#include "evpose/map_build/test_scan.h"
 #include "evpose/map_build/tiles.h"
 
 namespace evpose::map_build {
 namespace {
-
-constexpr double kNoise = 0.015;
-
-/// Points of rectangles, each noisy across its surface, as scans from everywhere would have them.
-class Scan {
- public:
-  explicit Scan(unsigned seed) : random_(seed) {}
-
-  Scan& rectangle(const Eigen::Vector3d& corner, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                  double per_m2 = 2500) {
-    std::uniform_real_distribution<double> share(0, 1);
-    std::normal_distribution<double> noise(0, kNoise);
-    const Eigen::Vector3d normal = a.cross(b).normalized();
-    const auto count = static_cast<int>(per_m2 * a.cross(b).norm());
-    for (int i = 0; i < count; ++i) {
-      const double u = share(random_), v = share(random_);
-      cloud_.points.push_back((corner + u * a + v * b + noise(random_) * normal).cast<float>());
-    }
-    return *this;
-  }
-  PointCloud cloud() const { return cloud_; }
-
- private:
-  std::mt19937 random_;
-  PointCloud cloud_;
-};
 
 /// Floor and two walls that meet at the origin, turned so that nothing lies along an axis.
 PointCloud room_corner(unsigned seed) {
@@ -54,24 +29,25 @@ PointCloud room_corner(unsigned seed) {
   return scan.cloud();
 }
 
-Expected<BuiltMap> build(const PointCloud& cloud, int threads = 1) {
-  ThreadPool pool(threads);
-  return build_map(cloud, {}, pool, [](double) { return true; });
+SurfacePoints described(std::vector<Eigen::Vector3f> points) {
+  ThreadPool pool(2);
+  const Neighbours tree(points);
+  const auto scale = measure_scale(points, tree, {}, "scan");
+  return describe_surface(std::move(points), tree, *scale, {}, pool);
 }
 
 TEST(SurfacePoints, NoiseAndSpacingOfAPlaneAreWhatTheyWereMadeWith) {
-  const auto scale =
-      measure_scale(Scan(1).rectangle({0, 0, 0}, {2, 0, 0}, {0, 2, 0}).cloud().points, {}, "scan");
+  const auto points = Scan(1).rectangle({0, 0, 0}, {2, 0, 0}, {0, 2, 0}).cloud().points;
+  const auto scale = measure_scale(points, Neighbours(points), {}, "scan");
   ASSERT_TRUE(scale);
   EXPECT_NEAR(scale->noise_m, kNoise, 0.1 * kNoise);
   EXPECT_NEAR(scale->spacing_m, 0.02, 0.002);
 }
 
 TEST(SurfacePoints, NormalsAreKnownAsWellAsWasAskedFor) {
-  ThreadPool pool(2);
   const auto points = Scan(2).rectangle({0, 0, 0}, {2, 0, 0}, {0, 2, 0}).cloud().points;
   const PatchConfig config;
-  const auto surface = describe_surface(points, *measure_scale(points, config, "scan"), config, pool);
+  const SurfacePoints surface = described(points);
   double sum = 0;
   int count = 0;
   for (std::size_t i = 0; i < surface.size(); ++i) {
@@ -337,24 +313,6 @@ TEST(MapBuilder, WhatIsNoSurfaceIsNamed) {
   EXPECT_FALSE(build(PointCloud()));
 }
 
-TEST(MapBuilder, ACylinderHasNoEdgesAlongIt) {
-  PointCloud cloud;
-  std::mt19937 random(8);
-  std::uniform_real_distribution<double> share(0, 1);
-  std::normal_distribution<double> noise(0, kNoise);
-  for (int i = 0; i < 9000; ++i) {
-    const double angle = 2 * M_PI * share(random), r = 0.25 + noise(random);
-    cloud.points.emplace_back(
-        Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), 2 * share(random)).cast<float>());
-  }
-  const auto built = build(cloud);
-  double along = 0;
-  if (built)
-    for (const auto& p : built->map.points)
-      along += std::abs(p.tangent.z()) > 0.9F ? static_cast<double>(p.length) : 0;
-  EXPECT_LT(along, 0.5);
-}
-
 TEST(StepFit, FindsTheEdgeOfADensityWithinItsOwnError) {
   std::mt19937 random(9);
   double squares = 0;
@@ -473,14 +431,13 @@ TEST(Neighbours, WithinIsWhatCountingFinds) {
 }
 
 TEST(Outline, HasTheAreaOfThePlateWithoutItsHole) {
-  ThreadPool pool(1);
   Scan scan(10);  // a frame of four boards around a hole of 0.6 x 0.4
   scan.rectangle({0, 0, 0}, {1.2, 0, 0}, {0, 0.3, 0}, 8000)
       .rectangle({0, 0.7, 0}, {1.2, 0, 0}, {0, 0.3, 0}, 8000);
   scan.rectangle({0, 0.3, 0}, {0.3, 0, 0}, {0, 0.4, 0}, 8000)
       .rectangle({0.9, 0.3, 0}, {0.3, 0, 0}, {0, 0.4, 0}, 8000);
   const auto points = scan.cloud().points;
-  const auto surface = describe_surface(points, *measure_scale(points, {}, "scan"), {}, pool);
+  const SurfacePoints surface = described(points);
   const Planes planes = find_planes(surface, {});
   ASSERT_EQ(planes.planes.size(), 1U);
   const Outline outline = trace_outline(surface, planes.planes[0]);
@@ -496,12 +453,11 @@ TEST(Outline, HasTheAreaOfThePlateWithoutItsHole) {
 }
 
 TEST(Outline, WhatPointsAreTooFewToCoverHidesNothing) {
-  ThreadPool pool(1);
   Scan scan(32);  // a wall; over half of it only slats of 3 cm, 12 cm apart, have points
   scan.rectangle({0, 0, 0}, {1, 0, 0}, {0, 1.2, 0}, 8000);
   for (int k = 0; k < 8; ++k) scan.rectangle({1.09 + 0.12 * k, 0, 0}, {0.03, 0, 0}, {0, 1.2, 0}, 8000);
   const auto points = scan.cloud().points;
-  const auto surface = describe_surface(points, *measure_scale(points, {}, "scan"), {}, pool);
+  const SurfacePoints surface = described(points);
   const Planes planes = find_planes(surface, {});
   ASSERT_GE(planes.planes.size(), 1U);
   double solid = 0;

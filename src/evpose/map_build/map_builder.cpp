@@ -6,13 +6,16 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
 #include "evpose/core/parallel.h"
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/contrast.h"
+#include "evpose/map_build/cylinders.h"
 #include "evpose/map_build/tiles.h"
+#include "evpose/map_build/view_points.h"
 
 namespace evpose::map_build {
 namespace {
@@ -87,6 +90,16 @@ void add_polygons(const FittedPlane& plane, std::int32_t number, const Outline& 
   }
 }
 
+/// A round body as a mark along its axis; its silhouette is as far from that as its radius.
+Piece mark_of(const Cylinder& cylinder) {
+  Piece out;
+  out.kind = ContourKind::limb;
+  out.begin = cylinder.begin;
+  out.end = cylinder.end;
+  out.sigma_m = cylinder.radius_m;
+  return out;
+}
+
 /// Rms of the plane that half of the points lie on smoother planes than.
 double typical_roughness(const Planes& planes) {
   std::vector<std::pair<double, std::size_t>> by_roughness;
@@ -131,20 +144,20 @@ namespace {
 
 /// Finds what one tile holds and adds to the map what lies in its core.
 Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config, ThreadPool& pool,
-                  const std::function<bool(double)>& progress, BuiltMap& out) {
+                  std::span<const View> views, const std::function<bool(double)>& progress, BuiltMap& out) {
   ContourMap& map = out.map;
   BuildFigures& figures = out.figures;
   figures.duplicates += put_in_order(cloud);
-  const auto scale = measure_scale(cloud.points, config.patch, cloud.source);
+  const Neighbours tree(cloud.points);
+  const auto scale = measure_scale(cloud.points, tree, config.patch, cloud.source);
   if (!scale) return scale.error();
   if (scale->noise_m > kWorstNoise_m && figures.scale.noise_m == 0)
     log_warning(text(cloud.source, ": noise of ", std::lround(1e3 * scale->noise_m),
                      " mm across the surfaces: are these centimetres? Metres are expected"));
   if (!progress(0.1)) return kGivenUp;
   const auto start = Clock::now();
-  const SurfacePoints surface = describe_surface(std::move(cloud.points), *scale, config.patch, pool);
+  const SurfacePoints surface = describe_surface(std::move(cloud.points), tree, *scale, config.patch, pool);
   if (!progress(0.6)) return kGivenUp;
-  const Neighbours tree(surface.position);
   const auto described = Clock::now();
   const Planes planes = find_planes(surface, config.plane);
   figures.normals_s += seconds(described - start);
@@ -164,40 +177,48 @@ Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config,
     for (const std::int32_t plane : {piece.plane_a, piece.plane_b})
       pieces[static_cast<std::size_t>(plane)].push_back(piece);
   std::vector<Outline> outlines(planes.planes.size());
-  std::vector<Boundaries> boundaries(planes.planes.size());
-  pool.for_chunks(planes.planes.size(), 1, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      outlines[p] = trace_outline(surface, planes.planes[p]);
-      if (unfit[p]) continue;
-      boundaries[p] = find_boundaries(surface, tree, planes.planes[p], static_cast<std::int32_t>(p),
-                                      outlines[p], pieces[p], config.boundary);
-    }
+  pool.for_chunks(planes.planes.size(), 1, [&](std::size_t p, std::size_t, std::size_t) {
+    outlines[p] = trace_outline(surface, planes.planes[p]);
   });
+  const std::vector<Boundaries> boundaries =
+      find_boundaries({surface, tree, planes, unfit, outlines, pieces, views}, config.boundary, pool);
   if (!progress(0.95)) return kGivenUp;
+  const std::vector<Cylinder> cylinders = find_cylinders(surface, tree, planes, curved);
   const auto first_plane = static_cast<std::int32_t>(map.planes.size());
-  const auto add = [&](const Piece& whole, double& length_m) {
+  std::int32_t chain = -1;  // of the last piece
+  const auto add = [&](const Piece& whole) {
     std::optional<Piece> piece = clipped(whole, tile);
     if (!piece) return;
-    piece->plane_a += first_plane;
+    if (piece->plane_a >= 0) piece->plane_a += first_plane;
     if (piece->plane_b >= 0) piece->plane_b += first_plane;
-    const std::int32_t number = map.points.empty() ? 0 : map.points.back().contour + 1;
+    const bool goes_on = piece->chain >= 0 && piece->chain == chain && !map.points.empty() &&
+                         map.points.back().plane_a == piece->plane_a;
+    chain = piece->chain;
+    const std::int32_t number = map.points.empty() ? 0 : map.points.back().contour + (goes_on ? 0 : 1);
     const std::int8_t contrast =
         cloud.brightness.empty() ? std::int8_t{0} : contrast_of(*piece, surface, tree, cloud.brightness);
     add_points(*piece, number, contrast, config.point_spacing_m, map);
-    length_m += piece->length_m();
+    figures.by_kind_m[static_cast<std::size_t>(piece->kind)] += piece->length_m();
   };
-  for (const Piece& piece : creases) add(piece, figures.crease_m);
+  for (const Piece& piece : creases) add(piece);
   for (std::size_t p = 0; p < planes.planes.size(); ++p) {
     const FittedPlane& plane = planes.planes[p];
-    for (const Piece& piece : boundaries[p].pieces) add(piece, figures.boundary_m);
-    figures.shadow_m += boundaries[p].shadow_m;
+    for (const Piece& piece : boundaries[p].pieces) {
+      add(piece);
+      if (!is_mark(piece.kind)) pieces[p].push_back(piece);
+    }
+    figures.left_out_m += boundaries[p].left_out_m;
     for (const std::uint32_t i : plane.points) figures.in_planes += tile.holds(surface.position[i]) ? 1 : 0;
     figures.curved += curved[p] ? 1 : 0;
-    pieces[p].insert(pieces[p].end(), boundaries[p].pieces.begin(), boundaries[p].pieces.end());
     add_polygons(plane, first_plane + static_cast<std::int32_t>(p), outlines[p], pieces[p], scale->noise_m,
                  map);
     map.planes.push_back({plane.normal.cast<float>(), plane.d,
                           static_cast<std::uint32_t>(plane.points.size()), static_cast<float>(plane.rms_m)});
+  }
+  for (const Cylinder& cylinder : cylinders) {
+    add(mark_of(cylinder));
+    const Eigen::Vector3f middle = (0.5 * (cylinder.begin + cylinder.end)).cast<float>();
+    if (tile.holds(middle)) ++(cylinder.is_pole ? figures.poles : figures.cylinders);
   }
   figures.scale = *scale;
   return {};
@@ -212,6 +233,8 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   map.anchor = cloud.anchor;
   map.source = cloud.source;
   out.figures.points = cloud.points.size();
+  std::vector<View> views;
+  for (const Eigen::Vector3d& eye : cloud.viewpoints) views.emplace_back(eye - cloud.anchor, cloud.points);
   const std::vector<Tile> tiles = cut_into_tiles(cloud.points, config.tile_points, config.tile_overlap_m);
   out.figures.tiles = tiles.size();
   std::optional<Error> barren;  // what a tile without planes said
@@ -223,14 +246,14 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
     };
     PointCloud part = tiles.size() == 1 ? std::move(cloud) : part_of(cloud, tiles[k]);
     if (!share(0)) return kGivenUp;
-    if (const Status done = build_tile(std::move(part), tiles[k], config, pool, share, out); !done) {
+    if (const Status done = build_tile(std::move(part), tiles[k], config, pool, views, share, out); !done) {
       if (given_up) return kGivenUp;
       barren = done.error();
     }
   }
   out.figures.planes = map.planes.size();
   if (map.planes.empty() && barren) return *barren;
-  if (map.points.empty())
+  if (std::all_of(map.points.begin(), map.points.end(), [](const auto& p) { return is_mark(p.kind); }))
     return Error{map.source, text("no contour among ", out.figures.planes, " planes"),
                  "give a larger or denser cloud"};
   map.occluders = triangulated(map.planes, map.polygons);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
@@ -36,8 +37,10 @@ struct BuildFigures {
   std::size_t tiles = 0;
   std::size_t points = 0, duplicates = 0, in_planes = 0, planes = 0, curved = 0;
   CloudScale scale;
-  double crease_m = 0, boundary_m = 0, shadow_m = 0;  ///< lengths; shadows are left out of the map
-  double normals_s = 0, planes_s = 0;                 ///< elapsed in these steps
+  std::size_t cylinders = 0, poles = 0;           ///< marked
+  std::array<double, kContourKinds> by_kind_m{};  ///< lengths in the map
+  double left_out_m = 0;                          ///< of outlines: short or unsure
+  double normals_s = 0, planes_s = 0;             ///< elapsed in these steps
 };
 
 struct BuiltMap {

@@ -7,7 +7,7 @@ namespace evpose::map_build {
 
 struct Neighbours::Tree {
   struct Adaptor {
-    const std::vector<Eigen::Vector3f>& points;
+    std::span<const Eigen::Vector3f> points;
     std::size_t kdtree_get_point_count() const { return points.size(); }
     float kdtree_get_pt(std::size_t i, std::size_t k) const {
       return points[i][static_cast<Eigen::Index>(k)];
@@ -19,7 +19,7 @@ struct Neighbours::Tree {
   };
   using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Adaptor>, Adaptor, 3,
                                                     std::uint32_t>;
-  explicit Tree(const std::vector<Eigen::Vector3f>& points)
+  explicit Tree(std::span<const Eigen::Vector3f> points)
       : adaptor{points}, index(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(16)) {
     index.buildIndex();
   }
@@ -27,7 +27,7 @@ struct Neighbours::Tree {
   Index index;
 };
 
-Neighbours::Neighbours(const std::vector<Eigen::Vector3f>& points) : tree_(std::make_unique<Tree>(points)) {}
+Neighbours::Neighbours(std::span<const Eigen::Vector3f> points) : tree_(std::make_unique<Tree>(points)) {}
 Neighbours::~Neighbours() = default;
 
 std::size_t Neighbours::nearest(const Eigen::Vector3f& p, std::span<std::uint32_t> indices,

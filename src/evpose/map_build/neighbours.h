@@ -12,8 +12,8 @@ namespace evpose::map_build {
 /// Finds the nearest points of a set. Queries may run in several threads at once.
 class Neighbours {
  public:
-  /// Keeps a reference.
-  explicit Neighbours(const std::vector<Eigen::Vector3f>& points);
+  /// The points must stay where they are.
+  explicit Neighbours(std::span<const Eigen::Vector3f> points);
   ~Neighbours();
   Neighbours(const Neighbours&) = delete;
   Neighbours& operator=(const Neighbours&) = delete;

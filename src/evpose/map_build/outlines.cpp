@@ -238,6 +238,7 @@ std::vector<Ring> straight_rings(const Grid& grid, const Eigen::Vector2d& low, d
     Ring traced;
     traced.corners = straightened(ring, 0.8 * cell_m);
     traced.coarse = straightened(ring, 1.5 * cell_m);
+    traced.steps = std::move(ring);
     if (traced.corners.size() < 3) continue;
     (twice_area(traced.corners) > 0 ? out : holes).push_back(std::move(traced));
   }

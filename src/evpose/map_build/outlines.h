@@ -23,6 +23,7 @@ struct PlaneFrame {
 struct Ring {
   std::vector<Eigen::Vector2d> corners;  ///< not repeated at the end
   std::vector<Eigen::Vector2d> coarse;   ///< the same line with fewer corners: sides long enough to be fitted
+  std::vector<Eigen::Vector2d> steps;    ///< the same line from cell to cell
   int hole_of = -1;                      ///< ring of the same outline that it cuts, -1: outer
 };
 

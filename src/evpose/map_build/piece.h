@@ -16,6 +16,7 @@ struct Piece {
   Eigen::Vector3d normal_a = Eigen::Vector3d::Zero();  ///< in plane a, across, out of its surface; unit
   Eigen::Vector3d normal_b = Eigen::Vector3d::Zero();  ///< the same of plane b; zero if there is none
   double sigma_m = 0;                                  ///< across the contour, 1 sigma
+  std::int32_t chain = -1;  ///< pieces of one curve, in their order, have the same; -1: a piece of its own
 
   double length_m() const { return (end - begin).norm(); }
   Eigen::Vector3d tangent() const { return (end - begin).normalized(); }

@@ -15,9 +15,9 @@ namespace {
 constexpr int kGeometry = 4;  // place, slope, height, depth
 constexpr int kSurfaces = 5;  // plane, face, under, beyond, rest
 constexpr int kFirstRounds = 10, kMostRounds = 40;
-constexpr double kNoGain = 1e-3;
-constexpr std::size_t kMostPoints = 1200;
-constexpr double kLeastDepthNoise = 0.6;  // shallower faces are none
+constexpr double kFirstGain = 0.1, kNoGain = 1e-3;  // of log likelihood: rounds that gain less are the last
+constexpr std::size_t kFirstPoints = 400, kMostPoints = 1200;  // first: to choose a start and a blur
+constexpr double kLeastDepthNoise = 0.6;                       // shallower faces are none
 
 /// The normal distribution and its integral from a table: they are asked for millions of times.
 class Normal {
@@ -82,7 +82,7 @@ class Section {
 
   State started(int side, bool ends, double depth, const Blur& blur) const;
   double log_likelihood(const State& s) const;
-  double improve(State& s, int rounds) const;
+  double improve(State& s, int rounds, double no_gain) const;
   Matrix information(const State& s, Vector* gradient, Densities* shares) const;
 
  private:
@@ -230,7 +230,7 @@ Matrix Section::information(const State& s, Vector* gradient, Densities* shares)
 }
 
 /// Rounds of expectation (densities) and Fisher scoring (geometry), only uphill.
-double Section::improve(State& s, int rounds) const {
+double Section::improve(State& s, int rounds, double no_gain) const {
   double likelihood = log_likelihood(s);
   const double noise = window_.noise_m;
   for (int round = 0; round < rounds; ++round) {
@@ -264,7 +264,7 @@ double Section::improve(State& s, int rounds) const {
       s = moved, likelihood += gain, gained += gain;
       break;
     }
-    if (gained < kNoGain) break;
+    if (gained < no_gain) break;
   }
   return likelihood;
 }
@@ -286,49 +286,60 @@ SectionWindow section_window(double half_length, double noise_m, double rms_m, d
   return out;
 }
 
+namespace {
+
+/// Every so-manieth point, so that there are no more than `most`.
+std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points, std::size_t most) {
+  if (points.size() <= most) return points;
+  std::vector<Eigen::Vector3d> out;
+  for (std::size_t k = 0, step = points.size() / most + 1; k < points.size(); k += step)
+    out.push_back(points[k]);
+  return out;
+}
+
+}  // namespace
+
 SectionFit fit_section(std::span<const Eigen::Vector3d> all, const SectionWindow& window) {
   std::vector<Eigen::Vector3d> points;
   for (const auto& p : all)
     if (std::abs(p.y()) <= window.half_width && std::abs(p.z()) <= window.half_height) points.push_back(p);
-  if (points.size() > kMostPoints) {
-    const std::size_t step = points.size() / kMostPoints + 1;
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < points.size(); k += step) points[kept++] = points[k];
-    points.resize(kept);
-  }
+  points = thinned(points, kMostPoints);
   SectionFit out;
   if (points.size() < 20) return out;
-  const Section section(points, window);
+  const std::vector<Eigen::Vector3d> some = thinned(points, kFirstPoints);
+  const Section section(points, window), first(some, window);
   struct Tried {
     State state;
     double log_likelihood;
   };
   const auto likelier = [](const Tried& a, const Tried& b) { return a.log_likelihood < b.log_likelihood; };
-  const auto improved = [&](State state, int rounds) {
-    const double likelihood = section.improve(state, rounds);
+  const auto improved = [&](State state) {
+    const double likelihood = first.improve(state, kFirstRounds, kFirstGain);
     return Tried{state, likelihood};
   };
   const Blur even{window.noise_m, window.height_noise_m, 0};
-  std::vector<Tried> faces, blurs[2];
+  std::vector<Tried> faces;
   for (const int side : {-1, 1}) {
-    faces.push_back(improved(section.started(side, false, window.half_height, even), kFirstRounds));
-    faces.push_back(improved(section.started(side, true, 1.5 * window.noise_m, even), kFirstRounds));
-    faces.push_back(improved(section.started(side, true, 0.55 * window.half_height, even), kFirstRounds));
+    faces.push_back(improved(first.started(side, false, window.half_height, even)));
+    faces.push_back(improved(first.started(side, true, 1.5 * window.noise_m, even)));
+    faces.push_back(improved(first.started(side, true, 0.55 * window.half_height, even)));
   }
-  const Tried face = *std::max_element(faces.begin(), faces.end(), likelier);
-  const Tried plain = improved(section.started(0, false, 0, even), kFirstRounds);
-  for (const double across_m :
-       {0.35 * window.noise_m, 0.7 * window.noise_m, window.noise_m, 1.4 * window.noise_m})
-    for (const double correlation : {-0.8, 0.0, 0.8})
-      for (const int k : {0, 1}) {
-        State state = k == 0 ? plain.state : face.state;
-        state.blur = {across_m, window.height_noise_m, correlation};
-        blurs[k].push_back(improved(state, kFirstRounds));
-      }
-  std::array<Tried, 2> tried;
-  for (const std::size_t k : {0U, 1U}) {
-    tried[k] = *std::max_element(blurs[k].begin(), blurs[k].end(), likelier);
-    tried[k].log_likelihood = section.improve(tried[k].state, kMostRounds);
+  std::array<Tried, 2> tried = {improved(first.started(0, false, 0, even)),
+                                *std::max_element(faces.begin(), faces.end(), likelier)};
+  for (Tried& best : tried) {
+    const auto blurred = [&](double across_m, double correlation) {
+      State state = best.state;
+      state.blur = {across_m, window.height_noise_m, correlation};
+      const Tried now = improved(state);
+      return now.log_likelihood > best.log_likelihood ? now : best;
+    };
+    for (const double across : {0.35, 0.7, 1.4}) best = blurred(across * window.noise_m, 0);
+    for (const double across : {1.0, 1.0 / 0.7})
+      for (const double correlation : {-0.8, 0.8})
+        best = blurred(std::min(across * best.state.blur.across_m, 1.4 * window.noise_m), correlation);
+    for (double& density : best.state.density)
+      density *= static_cast<double>(points.size()) / static_cast<double>(some.size());
+    best.log_likelihood = section.improve(best.state, kMostRounds, kNoGain);
   }
   const double gain = tried[1].log_likelihood - tried[0].log_likelihood;
   const State& s = tried[gain > 0 ? 1 : 0].state;

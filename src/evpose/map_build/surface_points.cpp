@@ -61,12 +61,11 @@ double median(std::vector<double>& values) {
 
 }  // namespace
 
-Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, const PatchConfig& config,
-                                   const std::string& where) {
+Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, const Neighbours& tree,
+                                   const PatchConfig& config, const std::string& where) {
   if (points.size() < kFewest)
     return Error{where, text("only ", points.size(), " different points"), "give a cloud of surfaces"};
   // The neighbours of a part of the points would lie further apart: the tree holds all.
-  const Neighbours tree(points);
   const std::size_t patch = std::min<std::size_t>(kLargestSamplePatch, points.size());
   std::vector<std::uint32_t> near(patch);
   std::vector<float> squares(patch);
@@ -113,8 +112,8 @@ Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, c
   return scale;
 }
 
-SurfacePoints describe_surface(std::vector<Eigen::Vector3f> points, const CloudScale& scale,
-                               const PatchConfig& config, ThreadPool& pool) {
+SurfacePoints describe_surface(std::vector<Eigen::Vector3f>&& points, const Neighbours& tree,
+                               const CloudScale& scale, const PatchConfig& config, ThreadPool& pool) {
   SurfacePoints out;
   out.position = std::move(points);
   out.scale = scale;
@@ -123,7 +122,6 @@ SurfacePoints describe_surface(std::vector<Eigen::Vector3f> points, const CloudS
   out.curvature.assign(count, 1.0F / 3);
   out.spacing_m.assign(count, static_cast<float>(scale.spacing_m));
   out.links.assign(count * SurfacePoints::kLinks, 0);
-  const Neighbours tree(out.position);
   const double enough = config.normal_sigma_rad * config.normal_sigma_rad;
   const int most = std::min(config.most, 2 * scale.neighbours);
   const auto usual = static_cast<std::size_t>(std::clamp(

@@ -15,6 +15,8 @@ struct PointCloud;
 
 namespace evpose::map_build {
 
+class Neighbours;
+
 /// What the cloud is like where it is flat: medians over a sample.
 struct CloudScale {
   double spacing_m = 0;  ///< a square of this side holds one point of a surface
@@ -45,11 +47,12 @@ struct PatchConfig {
 
 /// Spacing and noise from patches around a sample of points, each grown until it is flat. Errors: fewer than
 /// 50 points, or all of them on a line; `where` names the cloud in them.
-Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, const PatchConfig& config,
-                                   const std::string& where);
+Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, const Neighbours& tree,
+                                   const PatchConfig& config, const std::string& where);
 
 /// Normals and curvatures by principal components of each point's patch (EV-Pose, Map Construction).
-SurfacePoints describe_surface(std::vector<Eigen::Vector3f> points, const CloudScale& scale,
-                               const PatchConfig& config, ThreadPool& pool);
+/// `tree` is of the points, which are moved, not copied.
+SurfacePoints describe_surface(std::vector<Eigen::Vector3f>&& points, const Neighbours& tree,
+                               const CloudScale& scale, const PatchConfig& config, ThreadPool& pool);
 
 }  // namespace evpose::map_build

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kWidth = 900;    // px of a drawing
 constexpr double kTallest = 700;  // px
-constexpr std::array<const char*, 5> kKindNames{"unknown", "crease", "boundary", "marking", "limb"};
-constexpr std::array<const char*, 5> kKindColours{"#777777", "#0b62a4", "#d1495b", "#8f5fbf", "#e08e0b"};
+constexpr std::array<const char*, kContourKinds> kKindColours{"#777777", "#0b62a4", "#d1495b",
+                                                              "#8f5fbf", "#e08e0b", "#9aa5a0"};
 
 std::string format(const char* pattern, auto... values) {
   char buffer[512];
@@ -98,7 +98,7 @@ std::string draw_polygons(const ContourMap& map, const Projection& at) {
 }
 
 std::string draw_contours(const ContourMap& map, const Projection& at) {
-  std::array<std::string, 5> paths;
+  std::array<std::string, kContourKinds> paths;
   for (std::size_t i = 0; i < map.points.size(); ++i) {
     const ContourPoint& p = map.points[i];
     // Each point as the stretch that it stands for; 2 cm where the map does not say.
@@ -161,7 +161,7 @@ struct KindFigures {
 };
 
 std::string kinds_table(const ContourMap& map) {
-  std::array<KindFigures, 5> kinds;
+  std::array<KindFigures, kContourKinds> kinds;
   for (const auto& p : map.points) {
     KindFigures& k = kinds[static_cast<std::size_t>(p.kind)];
     k.length_m += static_cast<double>(p.length);
@@ -171,10 +171,13 @@ std::string kinds_table(const ContourMap& map) {
   std::string out = "<table><tr><th>kind<th>points<th>length m<th>mean sigma mm</tr>";
   for (std::size_t k = 0; k < kinds.size(); ++k)
     if (kinds[k].points > 0)
-      out += format("<tr><td style='color:%s'>%s<td>%zu<td>%.1f<td>%.2f</tr>", kKindColours[k], kKindNames[k],
-                    kinds[k].points, kinds[k].length_m,
+      out += format("<tr><td style='color:%s'>%s<td>%zu<td>%.1f<td>%.2f</tr>", kKindColours[k],
+                    kContourKindNames[k], kinds[k].points, kinds[k].length_m,
                     kinds[k].length_m > 0 ? 1e3 * kinds[k].sigma_sum / kinds[k].length_m : 0.0);
-  return out + "</table>";
+  return out +
+         "</table><p>Limbs (curved bodies, drawn along their axes; sigma is their radius) and shadows are "
+         "marks: "
+         "nothing is aligned to them.</p>";
 }
 
 std::string planes_table(const ContourMap& map) {

@@ -156,7 +156,12 @@ std::vector<PoseGuess> PoseSearch::search(const SearchView& view, const Pose& pr
   keep_different(guesses, static_cast<std::size_t>(config_.refined), focal);
   guesses.push_back(first);
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
-  for (PoseGuess& g : guesses) g = refine(view, g.T_map_body, information, 2 * config_.coarse_px);
+  const double evidence = static_cast<double>(view.points.size()) / kCorrelated;
+  for (PoseGuess& g : guesses) {
+    g = refine(view, g.T_map_body, information, 2 * config_.coarse_px);
+    const Vector6d off = g.T_map_body.minus(prior);
+    g.score -= 0.5 * off.dot(information * off) / evidence;
+  }
   keep_different(guesses, static_cast<std::size_t>(config_.kept), focal);
   return guesses;
 }

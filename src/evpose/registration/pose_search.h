@@ -39,7 +39,8 @@ struct SearchView {
 
 struct PoseGuess {
   Pose T_map_body;
-  double score = 0;  ///< mean log-odds of a point to lie on an edge rather than anywhere
+  double score =
+      0;  ///< mean log-odds of a point to lie on an edge rather than anywhere, with the prior's share
 };
 
 /// The coarse stage that design 5.6 and 5.9 ask for: poses drawn from the prior, compared by how many

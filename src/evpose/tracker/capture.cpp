@@ -9,23 +9,23 @@
 namespace evpose {
 namespace {
 
-constexpr double kPositionSigma_m = 4e-3, kRotationSigma_rad = 1e-3;  // of a pose that its events confirm
+constexpr double kPositionSigma_m = 0.02, kRotationSigma_rad = 5e-3;  // of a pose that edges alone tell
 constexpr double kGates_px[] = {3, 1.5, 0.8, 0.5};
 constexpr int kSteps = 3;  // at each gate
-constexpr double kSharpen_s = 0.01;
-constexpr double kSharpenSigma_m = 0.02, kSharpenSigma_rad = 0.01;
+constexpr double kPart_s = 0.008;
+constexpr std::size_t kParts = 5;  // looked at together, once a pose has been followed for so long
+constexpr double kSharpenSigma_m = 0.02, kSharpenSigma_rad = 0.01, kSharpenSigma_m_s = 0.3;
 constexpr double kStride_px = 8, kMargin_px = 40;
 constexpr double kLongestPause_s = 2;
 constexpr double kThinShare = 0.25;
 constexpr std::size_t kFewestEvents = 500;  // of a slice: nothing moves
 constexpr int kPoints = 700;
 constexpr double kCloseStride_px = 6;
-constexpr int kClosePoints = 2500;
+constexpr int kClosePoints = 1500;
 constexpr int kFlowCell_px = 16;
 constexpr double kWidening = 1.5;                  // of the prior, from search to search
 constexpr int kSameWidth = 3, kMostWidenings = 2;  // searches of the first width, then wider ones
-constexpr double kBlunt = 5;                       // times these for one that they do not
-constexpr double kNewest = 0.4;                    // weight of the newest slice in the mean slope
+constexpr double kNewest = 0.4;                    // weight of the newest slice in the means
 constexpr double kOne_m = 0.005, kOne_rad = 0.002, kOne_m_s = 0.1;
 constexpr double kSame_m = 0.02, kSame_rad = 0.007;  // candidates nearer than this are one
 
@@ -44,7 +44,9 @@ void describe(ConfigTable& table, CaptureConfig& c) {
   table.add("sharpened", c.sharpened, "", "poses whose events are looked at one by one", {1, 1000});
   table.add("least_slope", c.least_slope, "", "how much the events of a pose that is believed gather",
             {0, 1});
-  table.add("least_lead", c.least_lead, "", "... and more than those of the next", {0, 1});
+  table.add("least_lead", c.least_lead, "", "... and so many times more than those of the next", {1, 100});
+  table.add("low_slope", c.low_slope, "", "... or so much, if they are", {0, 1});
+  table.add("clear_lead", c.clear_lead, "", "... so many times more than those of the next", {1, 100});
   table.add("velocity_sigma_m_s", c.velocity_sigma_m_s, "m/s", "when a search begins", {0.01, 100});
   table.add("position_sigma_m", c.position_sigma_m, "m", "around the last pose when it was lost", {1e-3, 10});
   table.add("rotation_sigma_rad", c.rotation_sigma_rad, "rad", "around the last pose when it was lost",
@@ -98,6 +100,7 @@ void Capture::begin(TimeNs t, const NavState& state, const Matrix6d& covariance)
   prior_covariance_ = covariance;
   candidates_.clear();
   slice_.clear();
+  parts_.clear();
   slice_begin_ = t;
   last_slice_ = 0;
   since_ = {};
@@ -111,8 +114,38 @@ void Capture::resume(TimeNs t) {
   slice_begin_ = t;
   candidates_.clear();
   slice_.clear();
+  parts_.clear();
   slices_ = 0;
   ++searches_;
+}
+
+void Capture::remember(std::uint32_t now_us, std::span<const FrontEvent> events, const ImuIncrement& motion) {
+  if (parts_.empty() || parts_.back().motion.dt_s >= kPart_s) {
+    if (parts_.size() == kParts) {
+      parts_.push_back(std::move(parts_.front()));
+      parts_.pop_front();
+      parts_.back().events.clear();
+      parts_.back().motion = {};
+    } else {
+      parts_.emplace_back();
+    }
+  }
+  Part& part = parts_.back();
+  part.events.insert(part.events.end(), events.begin(), events.end());
+  part.now_us = now_us;
+  part.motion = joined(part.motion, motion);
+  part.rate = rate_;
+}
+
+/// The state at the begin of `motion` from that at its end.
+NavState Capture::before(const Candidate& c, const NavState& nav, const ImuIncrement& m) const {
+  const double dt = m.dt_s;
+  NavState out;
+  out.T_map_body.q = (nav.T_map_body.q * (has_imu_ ? m.dq.conjugate() : so3::exp(-dt * c.rate))).normalized();
+  out.velocity = nav.velocity - dt * gravity_map_ - out.T_map_body.q * m.dv;
+  out.T_map_body.p =
+      nav.T_map_body.p - dt * out.velocity - 0.5 * dt * dt * gravity_map_ - out.T_map_body.q * m.dp;
+  return out;
 }
 
 void Capture::move(Candidate& c, const ImuIncrement& m) const {
@@ -175,6 +208,7 @@ std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
                                             const Eigen::Vector3d& angular_rate) {
   since_ = joined(since_, motion);
   rate_ = angular_rate;
+  remember(now_us, events, motion);
   if (to_seconds(t - last_slice_) < (slices_ == 0 ? pause_s() : config_.gap_s)) {
     slice_begin_ = t;
     return {};
@@ -201,9 +235,9 @@ std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
   prior_ = prior.nav;
   elapsed_s_ += since_.dt_s;
   if (slices_ == 0)
-    first_slice(age_s, now_us, span_s);
+    first_slice(age_s);
   else
-    next_slice(age_s, now_us, span_s);
+    next_slice(age_s);
   since_ = {};
   ++slices_;
   const auto found = decide();
@@ -212,7 +246,7 @@ std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
   return found;
 }
 
-void Capture::first_slice(double age_s, std::uint32_t now_us, double span_s) {
+void Capture::first_slice(double age_s) {
   const double widening = std::pow(kWidening, std::clamp(searches_ - kSameWidth, 0, kMostWidenings));
   Matrix6d covariance = widening * widening * prior_covariance_;
   covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(config_.velocity_sigma_m_s * elapsed_s_, 2);
@@ -226,17 +260,17 @@ void Capture::first_slice(double age_s, std::uint32_t now_us, double span_s) {
     // The slice shows where the body was age_s ago.
     c.nav.T_map_body = {guess.T_map_body.q * so3::exp(age_s * rate_),
                         guess.T_map_body.p + age_s * prior_.velocity};
-    if (candidates_.size() < static_cast<std::size_t>(config_.sharpened)) sharpen(c, now_us, span_s);
-    const double share = c.slope >= config_.least_slope ? 1 : kBlunt;
+    if (candidates_.size() < static_cast<std::size_t>(config_.sharpened)) sharpen(c);
     c.slopes = c.slope;
-    c.position_variance = std::pow(share * kPositionSigma_m, 2);
-    c.rotation_variance = std::pow(share * kRotationSigma_rad, 2);
+    c.supports = c.support;
+    c.position_variance = std::pow(kPositionSigma_m, 2);
+    c.rotation_variance = std::pow(kRotationSigma_rad, 2);
     c.velocity_variance = config_.velocity_sigma_m_s * config_.velocity_sigma_m_s;
     candidates_.push_back(c);
   }
 }
 
-void Capture::next_slice(double age_s, std::uint32_t now_us, double span_s) {
+void Capture::next_slice(double age_s) {
   for (Candidate& c : candidates_) move(c, since_);
   if (candidates_.empty()) return;
   look(candidates_.front().nav.T_map_body);
@@ -245,30 +279,39 @@ void Capture::next_slice(double age_s, std::uint32_t now_us, double span_s) {
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     Candidate& c = candidates_[i];
     const Candidate predicted = c;
-    const Eigen::Vector3d rate = has_imu_ ? rate_ : c.rate;
-    const Pose then{c.nav.T_map_body.q * so3::exp(-age_s * rate),
-                    c.nav.T_map_body.p - age_s * c.nav.velocity};
-    Vector6d information;
-    information.head<3>().setConstant(1 / c.position_variance);
-    information.tail<3>().setConstant(1 / (c.rotation_variance + std::pow(kBlunt * kRotationSigma_rad, 2)));
-    const PoseGuess guess =
-        search_.refine(view, then, information.asDiagonal(), 2 * config_.search.coarse_px);
-    c.nav.T_map_body = c.nav.T_map_body.plus(guess.T_map_body.minus(then));
-    if (i < static_cast<std::size_t>(config_.sharpened)) sharpen(c, now_us, span_s);
+    const bool one_by_one = i < static_cast<std::size_t>(config_.sharpened);
+    if (one_by_one) sharpen(c);
+    if (!one_by_one || c.slope < config_.least_slope) {
+      // Perhaps the prediction was too far off: from where the slice's edges are.
+      Candidate other = predicted;
+      other.slope = other.support = 0;
+      const Eigen::Vector3d rate = has_imu_ ? rate_ : predicted.rate;
+      const Pose& now = predicted.nav.T_map_body;
+      const Pose then{now.q * so3::exp(-age_s * rate), now.p - age_s * predicted.nav.velocity};
+      Vector6d information;
+      information.head<3>().setConstant(1 / predicted.position_variance);
+      information.tail<3>().setConstant(1 / (predicted.rotation_variance + std::pow(kRotationSigma_rad, 2)));
+      const PoseGuess guess =
+          search_.refine(view, then, information.asDiagonal(), 2 * config_.search.coarse_px);
+      correct(other, guess.T_map_body.minus(then));
+      if (one_by_one) sharpen(other);
+      if (!one_by_one || other.support > c.support) c = other;
+    }
+    const Eigen::Quaterniond dq = predicted.nav.T_map_body.q.conjugate() * c.nav.T_map_body.q;
+    if (!has_imu_) c.rate += (slices_ == 1 ? 1 : 0.5) / std::max(since_.dt_s, 1e-3) * so3::log(dq);
+  }
+  for (Candidate& c : candidates_) {
     c.slopes += kNewest * (c.slope - c.slopes);
-    const Vector6d moved = c.nav.T_map_body.minus(predicted.nav.T_map_body);
-    c.nav = predicted.nav;
-    correct(c, moved, c.slope >= config_.least_slope ? 1 : kBlunt);
+    c.supports += kNewest * (c.support - c.supports);
   }
   std::stable_sort(candidates_.begin(), candidates_.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.slopes > b.slopes; });
+                   [](const Candidate& a, const Candidate& b) { return a.supports > b.supports; });
   drop_repeats();
 }
 
 /// Position and velocity by a Kalman filter of two states an axis, rotation likewise by one.
-void Capture::correct(Candidate& c, const Vector6d& moved, double share) const {
-  const double measured = std::pow(share * kPositionSigma_m, 2),
-               turned = std::pow(share * kRotationSigma_rad, 2);
+void Capture::correct(Candidate& c, const Vector6d& moved) const {
+  const double measured = std::pow(kPositionSigma_m, 2), turned = std::pow(kRotationSigma_rad, 2);
   const double gain = 1 / (c.position_variance + measured);
   c.nav.T_map_body.p += gain * c.position_variance * moved.head<3>();
   c.nav.velocity += gain * c.covariance * moved.head<3>();
@@ -277,7 +320,6 @@ void Capture::correct(Candidate& c, const Vector6d& moved, double share) const {
   c.position_variance *= gain * measured;
   const double turn = c.rotation_variance / (c.rotation_variance + turned);
   c.nav.T_map_body.q = (c.nav.T_map_body.q * so3::exp(turn * moved.tail<3>())).normalized();
-  if (!has_imu_) c.rate += moved.tail<3>() / std::max(since_.dt_s, 1e-3) * (slices_ == 1 ? 1 : 0.5);
   c.rotation_variance *= turned / (c.rotation_variance + turned);
 }
 
@@ -294,31 +336,52 @@ void Capture::drop_repeats() {
   candidates_ = std::move(different);
 }
 
-/// Each event of the slice at its own time against the contours, under gates that close.
-void Capture::sharpen(Candidate& c, std::uint32_t now_us, double span_s) {
+/// Each event at its own time against the contours, under gates that close; pose and velocity are those that
+/// the last parts agree upon.
+void Capture::sharpen(Candidate& c) {
+  using Vector9d = Eigen::Matrix<double, 9, 1>;
+  using Matrix9d = Eigen::Matrix<double, 9, 9>;
   const ContourView view{index_.map(), pieces_, camera_, T_body_cam_, EventAlignmentConfig{}.map_sigma_m};
   const auto& chosen = all_visible_->choose(c.nav.T_map_body * T_body_cam_);
-  const Pose from = c.nav.T_map_body;
-  // The newest part, in which rates are constant.
-  span_s = std::min(span_s, kSharpen_s);
-  const auto begin = std::find_if(slice_.begin(), slice_.end(), [&](const FrontEvent& e) {
-    return 1e-6 * (now_us - e.stamp_us) <= span_s;
-  });
-  const std::span<const FrontEvent> events(begin, slice_.end());
-  Vector6d sure;
-  sure.head<3>().setConstant(1 / (kSharpenSigma_m * kSharpenSigma_m));
-  sure.tail<3>().setConstant(1 / (kSharpenSigma_rad * kSharpenSigma_rad));
+  const NavState from = c.nav;
+  const std::size_t n = std::min(parts_.size(), static_cast<std::size_t>(1 + 2 * slices_));
+  Vector9d sure;
+  sure.segment<3>(0).setConstant(1 / (kSharpenSigma_m * kSharpenSigma_m));
+  sure.segment<3>(3).setConstant(1 / (kSharpenSigma_rad * kSharpenSigma_rad));
+  sure.segment<3>(6).setConstant(std::pow(slices_ < 3 ? config_.velocity_sigma_m_s : kSharpenSigma_m_s, -2));
   const Matrix6d known = Matrix6d::Zero();
   for (const auto& stage : stages_)
     for (int step = 0; step < kSteps; ++step) {
-      Pose& pose = c.nav.T_map_body;
-      project_contours(view, chosen, {pose, c.nav.velocity, has_imu_ ? rate_ : c.rate}, span_s, samples_);
+      Vector9d off;
+      off << c.nav.T_map_body.minus(from.T_map_body), c.nav.velocity - from.velocity;
+      Matrix9d H = sure.asDiagonal();
+      Vector9d b = -sure.cwiseProduct(off);
       stage->forget();
-      const EventAlignmentResult r = stage->align({events, now_us, span_s, samples_, known});
-      c.slope = r.slope;
-      const Matrix6d H = r.information + Matrix6d(sure.asDiagonal());
-      const Vector6d d = H.ldlt().solve(r.vector - sure.cwiseProduct(pose.minus(from)));
-      if (d.allFinite() && !(stage == stages_.back() && step + 1 == kSteps)) pose = pose.plus(d);
+      NavState nav = c.nav;
+      double age_s = 0, matched = 0, asked = 0;
+      for (std::size_t k = 0; k < n; ++k) {
+        const Part& part = parts_[parts_.size() - 1 - k];
+        const double span_s = part.motion.dt_s;
+        project_contours(view, chosen, {nav.T_map_body, nav.velocity, has_imu_ ? part.rate : c.rate}, span_s,
+                         samples_);
+        const EventAlignmentResult r = stage->align({part.events, part.now_us, span_s, samples_, known});
+        c.slope = r.slope;
+        matched += r.matched_events;
+        asked += static_cast<double>(samples_.size());
+        Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
+        J.block<3, 3>(0, 0).setIdentity();
+        J.block<3, 3>(0, 6) = -age_s * Eigen::Matrix3d::Identity();
+        J.block<3, 3>(3, 3) = (nav.T_map_body.q.conjugate() * c.nav.T_map_body.q).toRotationMatrix();
+        H += J.transpose() * r.information * J;
+        b += J.transpose() * r.vector;
+        age_s += span_s;
+        nav = before(c, nav, part.motion);
+      }
+      c.support = c.slope * matched / std::max(1.0, asked);
+      const Vector9d d = H.ldlt().solve(b);
+      if (!d.allFinite() || (stage == stages_.back() && step + 1 == kSteps)) continue;
+      c.nav.T_map_body = c.nav.T_map_body.plus(d.head<6>());
+      c.nav.velocity += d.tail<3>();
     }
 }
 
@@ -330,12 +393,14 @@ std::optional<Capture::Found> Capture::decide() {
       const Vector6d d = c.nav.T_map_body.minus(best.nav.T_map_body);
       return d.head<3>().norm() >= kSame_m || d.tail<3>().norm() >= kSame_rad;
     });
-    const double lead = best.slopes - (rival == candidates_.end() ? 0 : rival->slopes);
-    if (best.slopes >= config_.least_slope && lead >= config_.least_lead) {
+    const double others = rival == candidates_.end() ? 0 : rival->supports;
+    const bool gathers = best.slopes >= config_.least_slope && best.supports >= config_.least_lead * others;
+    const bool alone = best.slopes >= config_.low_slope && best.supports >= config_.clear_lead * others;
+    if (gathers || alone) {
       searching_ = false;
       return Found{best.nav, has_imu_ ? rate_ : best.rate};
     }
-    if (slices_ < (best.slopes >= config_.least_slope ? config_.most_slices : config_.least_slices + 1))
+    if (slices_ < (best.slopes >= config_.low_slope ? config_.most_slices : config_.least_slices + 1))
       return {};
   }
   // Anew, from where the prior has come to, and wider.

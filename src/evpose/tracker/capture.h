@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,17 +18,18 @@ struct CaptureConfig {
   bool on = true;
   double from_px = 2.5;  ///< a start pose known better than this, as image motion, needs no search
   double slice_events_per_column =
-      10;                        ///< a slice of events is complete with so many times the image's width
-  double short_slice_s = 0.008;  ///< ... or with a quarter of them after this
+      30;                        ///< a slice of events is complete with so many times the image's width
+  double short_slice_s = 0.015;  ///< ... or with a quarter of them after this
   double longest_slice_s = 0.03;
-  double gap_s = 0.008;           ///< between slices
-  int least_slices = 4;           ///< before a pose is believed
-  int most_slices = 10;           ///< then the search starts anew, further around
-  int sharpened = 8;              ///< poses whose events are looked at one by one
-  double least_slope = 0.42;      ///< of a pose that is believed, how its events gather at the contours
-  double least_lead = 0.1;        ///< ... and its lead over the next
-  double velocity_sigma_m_s = 2;  ///< of the vehicle when the search begins
-  double position_sigma_m = 0.1;  ///< around the last known pose when it was lost, per axis
+  double gap_s = 0.004;       ///< between slices
+  int least_slices = 4;       ///< before a pose is believed
+  int most_slices = 10;       ///< then the search starts anew, further around
+  int sharpened = 8;          ///< poses whose events are looked at one by one
+  double least_slope = 0.42;  ///< of a pose that is believed, how its events gather at the contours
+  double least_lead = 1.15;   ///< ... and its lead over the next, in events that gather
+  double low_slope = 0.3, clear_lead = 2;  ///< less will do for a pose without a rival
+  double velocity_sigma_m_s = 2;           ///< of the vehicle when the search begins
+  double position_sigma_m = 0.1;           ///< around the last known pose when it was lost, per axis
   double rotation_sigma_rad = 0.035;
   double verify_s = 0.06;   ///< a pose found is watched for so long before it is called tracking
   double patience_s = 0.5;  ///< lost, or events that do not gather at the contours, for so long: search
@@ -69,16 +71,26 @@ class Capture {
     NavState nav;
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< without a gyroscope
     double position_variance = 0, velocity_variance = 0, covariance = 0, rotation_variance = 0;
-    double slope = 0, slopes = 0;  ///< of its events when sharpened; mean over slices
+    double slope = 0, slopes = 0;      ///< of its events when sharpened; mean over slices
+    double support = 0, supports = 0;  ///< events of a point that gather there beyond an even spread; mean
+  };
+  /// Some events one after another, up to now_us, and how the body moved meanwhile.
+  struct Part {
+    std::vector<FrontEvent> events;
+    std::uint32_t now_us = 0;
+    ImuIncrement motion;
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   };
   void move(Candidate& c, const ImuIncrement& motion) const;
-  void first_slice(double age_s, std::uint32_t now_us, double span_s);
-  void next_slice(double age_s, std::uint32_t now_us, double span_s);
-  void correct(Candidate& c, const Vector6d& moved, double share) const;
+  void first_slice(double age_s);
+  void next_slice(double age_s);
+  void correct(Candidate& c, const Vector6d& moved) const;
   void drop_repeats();
   void look(const Pose& T_map_body);
   void turn_back(double age_s, std::uint32_t now_us);
-  void sharpen(Candidate& c, std::uint32_t now_us, double span_s);
+  void remember(std::uint32_t now_us, std::span<const FrontEvent> events, const ImuIncrement& motion);
+  NavState before(const Candidate& c, const NavState& nav, const ImuIncrement& motion) const;
+  void sharpen(Candidate& c);
   std::optional<Found> decide();
   double pause_s() const;
 
@@ -96,6 +108,7 @@ class Capture {
   Matrix6d prior_covariance_ = Matrix6d::Zero();
   std::vector<Candidate> candidates_;
   std::vector<FrontEvent> slice_, turned_;
+  std::deque<Part> parts_;  ///< the newest last
   TimeNs slice_begin_ = 0, last_slice_ = 0;
   ImuIncrement since_;    ///< motion since the last slice, or since begin()
   double elapsed_s_ = 0;  ///< from begin() to the last slice

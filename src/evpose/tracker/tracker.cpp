@@ -438,7 +438,7 @@ Update Tracker::update(TimeNs t) {
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
   // A pose that was found is believed once its events have gathered at the contours for a while.
   const bool watched = verify_until_ != 0,
-             refuted = watched && t >= verify_until_ && stpe.slope < config_.capture.least_slope;
+             refuted = watched && t >= verify_until_ && stpe.slope < config_.capture.low_slope;
   evidence.searching = searching || t < verify_until_ || refuted;
   evidence.refused = searching || refuted ? "searching for the pose"
                      : past               ? "the time offset has changed"

@@ -5,7 +5,7 @@
     simulator_accuracy.py EVPOSE RECORDINGS OUT.md [--seconds 2] [--only NAME...]
 
 Makes the recordings that RECORDINGS does not hold yet (half a minute of two cores per second of 640x480, two minutes
-at 1280x720, 20 MB a second and more), tracks each from ground truth without alignment, and scores what comes after
+at 1280x720, 20 MB a second and more; half an hour for the hover of half a minute), tracks each from ground truth without alignment, and scores what comes after
 the first 0.3 s. Maps with errors are the true contours whose 12 cm pieces are moved across their direction. Needs numpy.
 """
 import argparse
@@ -23,6 +23,8 @@ HARD = ["hdr_window", "hdr_lights_off", "hdr_flicker", "fan", "people", "car"]
 PLAIN = ["indoor_spiral", "outdoor_spiral", "landing"]
 LARGE = ["camera.size=720p"]
 SMALL = ["camera.size=vga"]
+TINY = ["camera.size=custom", "camera.width=320", "camera.height=240", "camera.focal_px=190"]
+HOVER_S = 30
 
 
 def simulate(evpose, folder, scenario, settings, seconds):
@@ -96,13 +98,15 @@ def main():
     flights += [(f"imu_1khz, {rate} Hz", "imu_1khz", SMALL, ["--set", f"rate_hz={rate}"])
                 for rate in (100, 200, 300, 1000)]
     flights += [(f"{s}, map {mm} mm off", s, SMALL, mm) for mm in (3, 5) for s in PLAIN]
+    flights.append((f"hover of {HOVER_S} s, 320x240", "hover", TINY, []))
     lines = ["Made by `scripts/simulator_accuracy.py`; do not edit.", "",
              "| flight | status | coverage | ATE mean mm | max mm | ARE mean deg | NEES/6 |", "|---|---|---|---|---|---|---|"]
     for name, scenario, settings, extra in flights:
         if a.only and name not in a.only:
             continue
-        folder = a.recordings / (scenario + ("_720p" if settings is LARGE else ""))
-        simulate(a.evpose, folder, scenario, settings, a.seconds)
+        suffix = "_720p" if settings is LARGE else f"_{HOVER_S}s" if settings is TINY else ""
+        folder = a.recordings / (scenario + suffix)
+        simulate(a.evpose, folder, scenario, settings, HOVER_S if settings is TINY else a.seconds)
         with tempfile.TemporaryDirectory() as scratch:
             contours = folder / "contours.ply"
             if isinstance(extra, int):

@@ -14,10 +14,11 @@ std::string encode_png(const RgbImage& image) {
   png.width = static_cast<png_uint_32>(image.width);
   png.height = static_cast<png_uint_32>(image.height);
   png.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
+  // Written twice, first to learn the size: the largest possible one is that of the raw picture.
+  png_alloc_size_t size = 0;
+  EVPOSE_CHECK(png_image_write_to_memory(&png, nullptr, &size, 0, image.rgb.data(), 0, nullptr) != 0);
   std::string bytes(size, '\0');
   EVPOSE_CHECK(png_image_write_to_memory(&png, bytes.data(), &size, 0, image.rgb.data(), 0, nullptr) != 0);
-  bytes.resize(size);
   return bytes;
 }
 

@@ -161,6 +161,27 @@ class CloudsTest(unittest.TestCase):
     def test_other_files(self):
         self.refused(b"hello, here are no points\n" * 100, "neither PLY, PCD nor LAS", name="cloud.txt")
 
+    def test_a_column_is_marked_and_told(self):
+        random = np.random.default_rng(3)
+        angle, height = random.uniform(0, 2 * np.pi, 8000), random.uniform(0, 1.5, 8000)
+        radius = 0.15 + random.normal(0, NOISE_M, 8000)
+        column = np.stack([0.8 + radius * np.cos(angle), 0.8 + radius * np.sin(angle), height], axis=1)
+        self.made(ply(np.concatenate([corner(), column])))
+        with h5py.File(self.map) as file:
+            sigma = file["contours/sigma"][:][file["contours/kind"][:] == 4]
+        self.assertEqual(len(sigma), 1)
+        self.assertAlmostEqual(float(sigma[0]), 0.15, delta=0.005)
+        said = subprocess.run([EVPOSE, "map", "info", str(self.map)], capture_output=True, text=True, check=True).stdout
+        self.assertRegex(said, r"limb +1\.[345] m, marks")
+
+    def test_view_points_are_places(self):
+        content = ply(corner())
+        result = self.build(content, "cloud.ply", "--viewpoint", "1,2")
+        self.assertEqual(result.returncode, 2)
+        self.assertRegex(result.stderr, r"^evpose: --viewpoint: has 2 numbers in all; .+\n$")
+        result = self.build(content, "cloud.ply", "--viewpoint", "-1,2,3", "--viewpoint", "1,1,1")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
     def test_an_interruption_writes_nothing(self):
         points = np.concatenate([corner(per_m2=20000) + [4.0 * k, 0, 0] for k in range(5)])
         process = subprocess.Popen(self.command(ply(points), "cloud.ply", "--threads", "1"), stdout=subprocess.DEVNULL,

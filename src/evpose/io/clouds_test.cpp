@@ -226,6 +226,25 @@ TEST(Pcd, EveryEncodingGivesTheSameTable) {
   }
 }
 
+TEST(Pcd, AViewpointIsHandedOnUnlessItIsTheOrigin) {
+  const TemporaryFolder folder;
+  const auto read = [&](const std::string& viewpoint) {
+    return read_pcd(folder.file("a.pcd",
+                                "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\n"
+                                "HEIGHT 1\n" +
+                                    viewpoint + "POINTS 1\nDATA ascii\n1 2 3\n"));
+  };
+  const auto told = read("VIEWPOINT 1.5 -2 0.25 1 0 0 0\n");
+  ASSERT_TRUE(told.ok()) << error_line(told);
+  EXPECT_EQ(told->viewpoint, (std::array<double, 3>{1.5, -2, 0.25}));
+  for (const char* unknown :
+       {"", "VIEWPOINT 0 0 0 1 0 0 0\n", "VIEWPOINT 1 nan 0 1 0 0 0\n", "VIEWPOINT 1\n"}) {
+    const auto table = read(unknown);
+    ASSERT_TRUE(table.ok()) << error_line(table);
+    EXPECT_FALSE(table->viewpoint) << unknown;
+  }
+}
+
 TEST(Pcd, TruncationAnywhereIsAnswered) {
   const TemporaryFolder folder;
   for (const char* data : {"ascii", "binary", "binary_compressed"}) {

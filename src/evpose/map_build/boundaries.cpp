@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -20,7 +21,7 @@ constexpr double kLeastDepth = 1.5;      // noise: of a face whose edges are tol
 constexpr double kMostDepth = 3.5;       // ... and of one too narrow for a plane of its own
 constexpr double kUneven = 0.1;          // noise: that many points do not average away
 constexpr double kArcPart_m = 0.02;      // straight pieces that an arc is written in
-constexpr double kFewestChunks = 3;      // of an arc, each fitted on its own ...
+constexpr int kFewestChunks = 3;         // of an arc, each fitted on its own ...
 constexpr double kLeastGain = 4;         // of log likelihood, by an arc over lines
 constexpr double kMostChunkSigma = 3;    // ... to so much worse than the arc must be known
 
@@ -63,7 +64,9 @@ class BoundaryFinder {
   bool is_edge(const FittedEdge& fitted, const Piece& piece) const;
   std::optional<Piece> far_edge(const Piece& near, const SectionFit& section) const;
   std::vector<Piece> pieces_along(const FittedEdge& fitted) const;
-  void add_arc(const Ring& ring, const ArcStretch& stretch, std::vector<Piece>& out) const;
+  double chunk_m() const { return std::max(config_.least_length_m, 2.5 * outline_.cell_m); }
+  std::vector<FittedEdge> chunks_of(const Circle& circle, double from_rad, double to_rad, int chunks) const;
+  std::vector<Piece> arc(const Ring& ring, const ArcStretch& stretch) const;
 
   const SurfacePoints& surface_;
   const Neighbours& tree_;
@@ -231,8 +234,7 @@ std::vector<Piece> BoundaryFinder::pieces_along(const FittedEdge& fitted) const 
 
 /// `piece`: where it would be, straight.
 bool BoundaryFinder::is_edge(const FittedEdge& fitted, const Piece& piece) const {
-  if (fitted.verdict != FittedEdge::Verdict::sharp) return false;
-  if (goes_on(piece)) return false;
+  if (fitted.verdict != FittedEdge::Verdict::sharp || goes_on(piece)) return false;
   const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
   return fitted.section.side == 0 || !stands_before(tree_, piece, reach, reach);
 }
@@ -263,107 +265,104 @@ Traced BoundaryFinder::side(const Ring& ring, std::size_t number, const std::vec
   return out;
 }
 
-/// An arc around `angle` that turns by `turn_rad`; `direction`: +1 where the surface is inside the circle.
-Edge arc_edge(const Circle& circle, double angle, double direction, double turn_rad) {
-  const Eigen::Vector2d outwards(std::cos(angle), std::sin(angle)), out = direction * outwards;
+/// The arc of a circle from one angle to another; `inside`: +1 where the surface is inside the circle, or -1.
+Edge arc_edge(const Circle& circle, double from_rad, double to_rad, double inside) {
+  const double middle = 0.5 * (from_rad + to_rad);
+  const Eigen::Vector2d outwards(std::cos(middle), std::sin(middle)), out = inside * outwards;
   return {circle.centre + circle.radius_m * outwards,
           {-out.y(), out.x()},
           out,
-          0.5 * turn_rad * circle.radius_m,
-          direction / circle.radius_m};
+          0.5 * std::abs(to_rad - from_rad) * circle.radius_m,
+          inside / circle.radius_m};
 }
 
-/// Fits the chunks of a stretch one by one, a circle through them, and keeps it where it is likelier than
-/// the straight sides of the ring.
-void BoundaryFinder::add_arc(const Ring& ring, const ArcStretch& stretch, std::vector<Piece>& out) const {
-  const std::size_t n = ring.steps.size();
-  const double direction = [&] {  // of the ring around the circle's centre
-    const Eigen::Vector2d a = ring.steps[stretch.first] - stretch.circle.centre;
-    const Eigen::Vector2d b = ring.steps[(stretch.first + stretch.count / 4) % n] - stretch.circle.centre;
-    return a.x() * b.y() - a.y() * b.x() > 0 ? 1.0 : -1.0;
-  }();
-  const auto angle_of = [&](std::size_t k) {
-    const Eigen::Vector2d d = ring.steps[(stretch.first + k) % n] - stretch.circle.centre;
-    return std::atan2(d.y(), d.x());
-  };
-  double turn = 0;
-  for (std::size_t k = 0; k + 1 < stretch.count; ++k)
-    turn += std::remainder(angle_of(k + 1) - angle_of(k), 2 * M_PI);
-  const double length = std::abs(turn) * stretch.circle.radius_m;
-  const double chunk_m = std::max(config_.least_length_m, 2.5 * outline_.cell_m);
-  const int chunks = static_cast<int>(length / chunk_m);
-  if (chunks < kFewestChunks) return;
-  std::vector<FittedEdge> fitted;
+/// Angle of a place on a circle, within half a turn of another.
+double angle_near(const Circle& circle, const Eigen::Vector2d& place, double other_rad) {
+  const Eigen::Vector2d d = place - circle.centre;
+  return other_rad + std::remainder(std::atan2(d.y(), d.x()) - other_rad, 2 * std::numbers::pi);
+}
+
+int nearest_side(const std::vector<Eigen::Vector2d>& corners, const Eigen::Vector2d& place) {
+  double least = INFINITY;
+  std::size_t nearest = 0;
+  for (std::size_t s = 0; s < corners.size(); ++s) {
+    const Eigen::Vector2d &a = corners[s], &b = corners[(s + 1) % corners.size()];
+    const double share = std::clamp((place - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+    const double off = (place - a - share * (b - a)).norm();
+    if (off < least) least = off, nearest = s;
+  }
+  return static_cast<int>(nearest);
+}
+
+/// Fits the chunks of an arc one by one; those that are edges.
+std::vector<FittedEdge> BoundaryFinder::chunks_of(const Circle& circle, double from_rad, double to_rad,
+                                                  int chunks) const {
+  std::vector<FittedEdge> out;
+  const double step = (to_rad - from_rad) / chunks, inside = step > 0 ? 1 : -1;
+  for (int k = 0; k < chunks; ++k) {
+    const FittedEdge chunk =
+        fitter_.fit(arc_edge(circle, from_rad + k * step, from_rad + (k + 1) * step, inside));
+    FittedEdge straight = chunk;
+    straight.edge.bend = 0;
+    const Piece piece = pieces_along(straight).front();
+    if (chunk.across_m > kMostChunkSigma * config_.most_sigma_m || !is_edge(chunk, piece)) continue;
+    if (views_.empty() ? covered(piece) : hidden(piece)) continue;
+    out.push_back(chunk);
+  }
+  return out;
+}
+
+/// The part of a stretch that an arc explains better than the straight sides of the ring.
+std::vector<Piece> BoundaryFinder::arc(const Ring& ring, const ArcStretch& stretch) const {
+  const double first = angle_near(stretch.circle, ring.steps[stretch.first], 0);
+  double last = first;
+  for (std::size_t k = 1; k < stretch.count; ++k)
+    last = angle_near(stretch.circle, ring.steps[(stretch.first + k) % ring.steps.size()], last);
+  const int chunks = static_cast<int>(std::abs(last - first) * stretch.circle.radius_m / chunk_m());
+  if (chunks < kFewestChunks) return {};
+  const std::vector<FittedEdge> fitted = chunks_of(stretch.circle, first, last, chunks);
+  if (2 * static_cast<int>(fitted.size()) < std::max(2 * kFewestChunks, chunks)) return {};
+  // Each chunk tells two places of the curve; the nearest straight side is the line they would be on.
   std::vector<CurvePlace> places;
   std::vector<int> line_of;
-  for (int k = 0; k < chunks; ++k) {
-    const double angle = angle_of(0) + turn * (k + 0.5) / chunks;
-    const Edge edge = arc_edge(stretch.circle, angle, direction, std::abs(turn) / chunks);
-    const FittedEdge found = fitter_.fit(edge);
-    Edge straight = found.edge;
-    straight.bend = 0;
-    FittedEdge for_tests = found;
-    for_tests.edge = straight;
-    const Piece piece = pieces_along(for_tests).front();
-    if (found.across_m > kMostChunkSigma * config_.most_sigma_m || !is_edge(found, piece)) continue;
-    if (views_.empty() ? covered(piece) : hidden(piece)) continue;
-    // Each chunk tells two places of the curve; the nearest straight side is the line they would be on.
+  for (const FittedEdge& chunk : fitted)
     for (const double t : {-0.5, 0.5}) {
-      const Eigen::Vector2d place = found.edge.at(t * edge.half_length);
-      places.push_back({place, std::sqrt(2.0) * found.across_m});
-      double least = INFINITY;
-      int line = 0;
-      for (std::size_t s = 0; s < ring.coarse.size(); ++s) {
-        const Eigen::Vector2d &a = ring.coarse[s], &b = ring.coarse[(s + 1) % ring.coarse.size()];
-        const double share = std::clamp((place - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
-        const double off = (place - a - share * (b - a)).norm();
-        if (off < least) least = off, line = static_cast<int>(s);
-      }
-      line_of.push_back(line);
+      const Eigen::Vector2d place = chunk.edge.at(t * chunk.edge.half_length);
+      places.push_back({place, std::sqrt(2.0) * chunk.across_m});
+      line_of.push_back(nearest_side(ring.coarse, place));
     }
-    fitted.push_back(found);
-  }
-  if (static_cast<double>(fitted.size()) < std::max(kFewestChunks, 0.5 * chunks)) return;
   const auto run = likeliest_arc(places, line_of, 2 * static_cast<std::size_t>(kFewestChunks));
-  if (!run || run->gain < kLeastGain) return;
-  const Circle& circle = run->circle;
+  if (!run || run->gain < kLeastGain) return {};
   // All points along the run once more, together: a short chunk is drawn inwards by having few.
-  const auto chunks_of_run = std::span(fitted).subspan(run->first / 2, run->count / 2);
-  const auto angle_on = [&](const FittedEdge& chunk) {
-    const Eigen::Vector2d d = chunk.edge.middle - circle.centre;
-    return std::atan2(d.y(), d.x());
-  };
-  double run_turn = 0;
-  for (std::size_t k = 0; k + 1 < chunks_of_run.size(); ++k)
-    run_turn += std::remainder(angle_on(chunks_of_run[k + 1]) - angle_on(chunks_of_run[k]), 2 * M_PI);
-  run_turn += std::copysign(2 * fitted.front().edge.half_length / circle.radius_m, run_turn);
-  if (std::abs(run_turn) > 2 * M_PI) run_turn = std::copysign(2 * M_PI, run_turn);
-  const double middle = angle_on(chunks_of_run.front()) + 0.5 * run_turn -
-                        std::copysign(fitted.front().edge.half_length / circle.radius_m, run_turn);
-  const FittedEdge whole = fitter_.fit(arc_edge(circle, middle, direction, std::abs(run_turn)));
-  if (whole.verdict != FittedEdge::Verdict::sharp || whole.across_m > config_.most_sigma_m) return;
-  for (const Piece& piece : pieces_along(whole)) {
+  const auto of_run = std::span(fitted).subspan(run->first / 2, run->count / 2);
+  const double from = angle_near(run->circle, of_run.front().edge.middle, first);
+  double to = from;
+  for (const FittedEdge& chunk : of_run) to = angle_near(run->circle, chunk.edge.middle, to);
+  const double inside = last > first ? 1 : -1;
+  const double half = std::min(of_run.front().edge.half_length / run->circle.radius_m,
+                               std::numbers::pi - 0.5 * std::abs(to - from));
+  const FittedEdge whole =
+      fitter_.fit(arc_edge(run->circle, from - inside * half, to + inside * half, inside));
+  if (whole.verdict != FittedEdge::Verdict::sharp || whole.across_m > config_.most_sigma_m) return {};
+  std::vector<Piece> out = pieces_along(whole);
+  std::erase_if(out, [&](const Piece& piece) {
     const Eigen::Vector2d at = frame().flat(0.5 * (piece.begin + piece.end));
     // Where its chunk was no edge, the arc has a gap.
-    if (std::any_of(chunks_of_run.begin(), chunks_of_run.end(), [&](const FittedEdge& chunk) {
-          return std::abs(chunk.edge.local(at).x()) <= chunk.edge.half_length;
-        }))
-      out.push_back(piece);
-  }
+    const bool is_edge = std::any_of(of_run.begin(), of_run.end(), [&](const FittedEdge& chunk) {
+      return std::abs(chunk.edge.local(at).x()) <= chunk.edge.half_length;
+    });
+    return !is_edge || explained(frame().flat(piece.begin), frame().flat(piece.end), creases_);
+  });
+  return out;
 }
 
 std::vector<Piece> BoundaryFinder::arcs(const Ring& ring) const {
   std::vector<Piece> out;
-  const double least_m = kFewestChunks * std::max(config_.least_length_m, 2.5 * outline_.cell_m);
-  for (const ArcStretch& stretch : find_arcs(ring.steps, outline_.cell_m, least_m)) {
-    std::vector<Piece> arc;
-    add_arc(ring, stretch, arc);
-    std::erase_if(arc, [&](const Piece& piece) {
-      return explained(frame().flat(piece.begin), frame().flat(piece.end), creases_);
-    });
-    for (Piece& piece : arc) piece.chain = static_cast<std::int32_t>(out.size());
-    out.insert(out.end(), arc.begin(), arc.end());
-  }
+  for (const ArcStretch& stretch : find_arcs(ring.steps, outline_.cell_m, kFewestChunks * chunk_m()))
+    for (Piece& piece : arc(ring, stretch)) {
+      piece.chain = static_cast<std::int32_t>(stretch.first);
+      out.push_back(piece);
+    }
   return out;
 }
 
@@ -403,10 +402,13 @@ std::vector<Boundaries> find_boundaries(const BoundaryInput& input, const Bounda
     }
   });
   std::vector<Boundaries> out(planes);
-  for (std::size_t k = 0; k < rings.size(); ++k) {
-    const auto& [p, r, s] = rings[k];
-    for (Piece& piece : arcs[p][r]) {
-      piece.chain += static_cast<std::int32_t>(r) * 1'000'000;
+  std::int32_t chains = 0;
+  for (const auto& [p, r, s] : rings) {
+    std::int32_t in_ring = -1;
+    for (Piece piece : arcs[p][r]) {
+      chains += piece.chain != in_ring ? 1 : 0;
+      in_ring = piece.chain;
+      piece.chain = chains;
       out[p].pieces.push_back(piece);
     }
   }

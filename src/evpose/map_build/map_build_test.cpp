@@ -12,6 +12,7 @@
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/neighbours.h"
+#include "evpose/map_build/normal_table.h"
 #include "evpose/map_build/section_fit.h"
 #include "evpose/map_build/step_fit.h"
 #include "evpose/map_build/test_scan.h"
@@ -311,6 +312,14 @@ TEST(MapBuilder, WhatIsNoSurfaceIsNamed) {
   same.points.assign(1000, Eigen::Vector3f(1, 2, 3));
   EXPECT_FALSE(build(same));
   EXPECT_FALSE(build(PointCloud()));
+}
+
+TEST(NormalTable, IsTheNormalDistributionToFiveDigits) {
+  for (double x = -9; x < 9; x += 0.0137) {
+    EXPECT_NEAR(normal().density(x), std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI), 1e-5);
+    EXPECT_NEAR(normal().below(x), 0.5 * std::erfc(-x / std::sqrt(2.0)), 1e-5);
+    EXPECT_NEAR(normal().ramp(x + 1e-2) - normal().ramp(x - 1e-2), 2e-2 * normal().below(x), 1e-5);
+  }
 }
 
 TEST(StepFit, FindsTheEdgeOfADensityWithinItsOwnError) {

@@ -246,5 +246,26 @@ TEST(Arcs, ATablesRoundCornersAreArcsAndItsSidesStraight) {
   EXPECT_LT(std::sqrt(squares / (round + straight)), 0.005);
 }
 
+TEST(Marks, AreTheSameForAnyNumberOfThreads) {
+  const Eigen::Vector3d eye(0.2, -2, 1);
+  PointCloud cloud = scene_with_shadow(47, eye);
+  cloud.viewpoints = {eye};
+  const PointCloud more =
+      Scan(48)
+          .plate(0.3, 0.7, 4000, [](double x, double y) { return std::hypot(x, y) < 0.3; })
+          .cylinder({1, -1, 0}, 0.02, 1, 6000)
+          .cloud();
+  cloud.points.insert(cloud.points.end(), more.points.begin(), more.points.end());
+  const auto one = build(cloud, 1), three = build(cloud, 3);
+  ASSERT_TRUE(one && three);
+  ASSERT_EQ(one->map.points.size(), three->map.points.size());
+  for (std::size_t i = 0; i < one->map.points.size(); ++i) {
+    EXPECT_EQ(one->map.points[i].position, three->map.points[i].position);
+    EXPECT_EQ(one->map.points[i].kind, three->map.points[i].kind);
+    EXPECT_EQ(one->map.points[i].contour, three->map.points[i].contour);
+  }
+  EXPECT_GT(of_kind(one->map, ContourKind::limb).length_m, 0.5);
+}
+
 }  // namespace
 }  // namespace evpose::map_build

@@ -5,13 +5,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "evpose/map_build/normal_table.h"
 
 namespace evpose::map_build {
 namespace {
 
-double density_of(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
-double share_above(double x) { return 0.5 * std::erfc(x / std::numbers::sqrt2); }
+double density_of(double x) { return normal().density(x); }
+double share_above(double x) { return normal().below(-x); }
 
 struct Step {
   double place, slope, blur, inside, outside;  // densities per square metre
@@ -23,9 +24,8 @@ struct Step {
 /// Width of the strip |d| <= half_width that the step fills, and its derivative in the place. In closed form
 /// for a small slope, whose first order cancels.
 double filled(const Step& step, double half_width) {
-  const auto antiderivative = [](double x) { return x * share_above(-x) + density_of(x); };
-  return step.blur * (antiderivative((step.place + half_width) / step.blur) -
-                      antiderivative((step.place - half_width) / step.blur));
+  return step.blur * (normal().ramp((step.place + half_width) / step.blur) -
+                      normal().ramp((step.place - half_width) / step.blur));
 }
 double filled_slope(const Step& step, double half_width) {
   return share_above(-(step.place + half_width) / step.blur) -

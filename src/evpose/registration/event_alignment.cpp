@@ -116,7 +116,9 @@ void EventAlignment::sum_events(const EventAlignmentProblem& p, EventAlignmentRe
   if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);
   if (p.verdicts) owners_.assign(p.events.size(), -1);
   index_.find_all(p.events, p.now_us, &found_);
-  for (const auto& [k, owner] : found_) {
+  for (const StripIndex::Found& found : found_) {
+    const std::size_t k = found.event;
+    const StripIndex::Owner& owner = found.owner;
     const FrontEvent& e = p.events[k];
     const auto verdict = [&](EventVerdict v) {
       if (p.verdicts) (*p.verdicts)[k] = v, owners_[k] = owner.strip;

@@ -240,7 +240,7 @@ std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
     next_slice(age_s);
   since_ = {};
   ++slices_;
-  const auto found = decide();
+  auto found = decide();
   slice_.clear();
   slice_begin_ = last_slice_ = t;
   return found;

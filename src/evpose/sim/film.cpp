@@ -196,13 +196,13 @@ Film::Impl::Mover Film::Impl::mover_at(std::size_t part, TimeNs t, double ahead_
   if (behind == 8) return out;
   if (behind > 0)
     extent = Eigen::AlignedBox2d(Eigen::Vector2d(0, 0), Eigen::Vector2d(size.width, size.height));
-  // Corners beside the camera race to infinity unseen. What is in view goes no faster than the camera seen
-  // from the part, over the distance, at the image's corner.
-  const Eigen::Vector3d eye = here.inverse().p, later = there.inverse().p;
-  const double nearest = std::max(kNearest_m, std::sqrt(box.squaredExteriorDistance(eye)));
-  const double turn = (here.q.conjugate() * there.q).angularDistance(Eigen::Quaterniond::Identity());
+  // Corners beside the camera race to infinity unseen. What is in view goes no faster than the part's centre
+  // and its turning, over the distance, at the image's corner.
+  const double nearest = std::max(kNearest_m, std::sqrt(box.squaredExteriorDistance(here.inverse().p)));
+  const double way = (there * box.center() - here * box.center()).norm();
+  const double turned = 0.5 * box.diagonal().norm() * here.q.angularDistance(there.q);
   const double f = camera.focal_px(), wide = 0.5 * std::hypot(size.width, size.height) / f;
-  out.speed = std::min(out.speed, f * (1 + wide * wide) * (turn + (later - eye).norm() / nearest) / ahead_s);
+  out.speed = std::min(out.speed, f * (1 + wide * wide) * (way + turned) / (nearest * ahead_s));
   out.extent = {std::max(0, static_cast<int>(std::floor(extent.min().x())) - 2),
                 std::max(0, static_cast<int>(std::floor(extent.min().y())) - 2),
                 std::min(size.width, static_cast<int>(std::ceil(extent.max().x())) + 3),

@@ -181,7 +181,7 @@ class Street {
       car.name = "car " + std::to_string(i + 1);
       car.path = loop(-1.15, 1.15, 1, 0);
       car.speed_m_s = c.car_m_s;
-      car.start_m = 12 + 30.0 * i;  // overtakes who hovers over the start of the street
+      car.start_m = 20 + 30.0 * i;  // drives off before who hovers over the start of the street
       car.paint = i;
       add_car(d_.scene, movers_, car);
     }

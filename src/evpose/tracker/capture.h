@@ -39,10 +39,10 @@ struct CaptureConfig {
 void describe(ConfigTable& table, CaptureConfig& config);
 
 /// Finds the pose from a poor guess. In a first slice of events many poses are compared (PoseSearch); the
-/// best are followed over the next slices, moved by the IMU in between, which gives their velocity. In each
-/// slice a pose is sharpened: single events at their own times, under gates that close from 3 px to that of
-/// the tracker. How much events gather at the contours then, rather than lie evenly over the gate, tells the
-/// true pose.
+/// best are followed over the next slices. In each a pose is sharpened together with its velocity: single
+/// events of the last 40 ms at their own times, seen from where the IMU says that the body was, under gates
+/// that close from 3 px to that of the tracker. How many events gather at the contours then, rather than lie
+/// evenly over the gate, tells the true pose.
 class Capture {
  public:
   /// `gravity_map`: zero when there is no IMU.

@@ -6,6 +6,7 @@
 #include "evpose/fusion/ekf.h"
 #include "evpose/fusion/graph.h"
 #include "evpose/fusion/particle_filter.h"
+#include "evpose/fusion/piece_ekf.h"
 
 namespace evpose {
 
@@ -56,6 +57,11 @@ void describe(ConfigTable& table, SlowErrorsConfig& c) {
   table.add("offset_position_sigma_m", c.offset_position_sigma_m, "m", "its size, 1 sigma", {0, 1});
   table.add("offset_rotation_sigma_rad", c.offset_rotation_sigma_rad, "rad", "its size, 1 sigma", {0, 1});
   table.add("offset_s", c.offset_s, "s", "its correlation time", {1e-3, 1000});
+  table.add("piece_offset", c.piece_offset,
+            "estimate the offset of each contour piece (ekf); not together with other slow errors or calibration");
+  table.add("piece_sigma_m", c.piece_sigma_m, "m", "its size, 1 sigma", {1e-6, 1});
+  table.add("piece_m", c.piece_m, "m", "length of a piece", {1e-2, 100});
+  table.add("most_pieces", c.most_pieces, "", "so many at a time", {1, 1000});
 }
 
 void describe(ConfigTable& table, CalibrationConfig& c) {
@@ -79,6 +85,7 @@ std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& co
   const Motion motion(model, config, noise);
   switch (config.kind) {
     case BackEndKind::ekf:
+      if (config.slow.piece_offset) return std::make_unique<PieceEkf>(motion, config.slow);
       return std::make_unique<Ekf>(motion, config.calibration, config.slow, T_body_cam);
     case BackEndKind::graph:
       return std::make_unique<Graph>(motion, config.window, config.coupling);

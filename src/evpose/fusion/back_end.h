@@ -56,6 +56,10 @@ struct SlowErrorsConfig {
   double offset_position_sigma_m = 5e-4;
   double offset_rotation_sigma_rad = 2e-4;
   double offset_s = 0.3;  ///< its correlation time
+  bool piece_offset = false;  ///< offset of each contour piece; then none of the above
+  double piece_sigma_m = 1e-3;
+  double piece_m = 0.3;    ///< length of a piece
+  int most_pieces = 100;   ///< that are states at a time
 };
 void describe(ConfigTable& table, SlowErrorsConfig& config);
 

@@ -54,6 +54,7 @@ struct ContourOffset {
   Eigen::Vector3d across_body;  ///< distance across the contour in the image by the point, px/m
   double offset_px = 0;         ///< by which the point should move against `across_body`
   double weight = 0;            ///< px^-2
+  std::uint32_t piece = 0;      ///< of the contours, as the back end has them cut
 };
 
 /// The sum over the contours, made anew at another pose: the points turn and shift with it exactly, their

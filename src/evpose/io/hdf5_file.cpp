@@ -10,6 +10,7 @@
 
 #include "evpose/io/atomic_file.h"
 #include "evpose/io/hdf5_filters.h"
+#include "evpose/io/hdf5_trial.h"
 #include "evpose/io/input_file.h"
 
 namespace evpose {
@@ -50,6 +51,18 @@ hid_t memory_type(NumberType type) {
   return H5I_INVALID_HID;
 }
 
+/// The library takes the word of a file for where the bits of a number are.
+bool is_sound_number(hid_t type) {
+  const std::size_t bits = 8 * H5Tget_size(type);
+  const auto within = [bits](std::size_t from, std::size_t count) { return from <= bits && count <= bits - from; };
+  const int offset = H5Tget_offset(type);
+  if (offset < 0 || !within(static_cast<std::size_t>(offset), H5Tget_precision(type))) return false;
+  if (H5Tget_class(type) != H5T_FLOAT) return true;
+  std::size_t sign = 0, exponent = 0, exponent_bits = 0, mantissa = 0, mantissa_bits = 0;
+  return H5Tget_fields(type, &sign, &exponent, &exponent_bits, &mantissa, &mantissa_bits) >= 0 &&
+         within(sign, 1) && within(exponent, exponent_bits) && within(mantissa, mantissa_bits);
+}
+
 /// The type whose values are those of a stored one; half and long floats are read as double.
 std::optional<NumberType> number_type(hid_t type) {
   hid_t number = type;
@@ -58,6 +71,7 @@ std::optional<NumberType> number_type(hid_t type) {
     base = own(H5Tget_super(type), H5Tclose);
     number = base.get();
   }
+  if (!is_sound_number(number)) return std::nullopt;
   const std::size_t size = H5Tget_size(number);
   if (H5Tget_class(number) == H5T_FLOAT) return size == 4 ? NumberType::f32 : NumberType::f64;
   const bool is_signed = H5Tget_sign(number) == H5T_SGN_2;
@@ -73,6 +87,28 @@ std::optional<NumberType> number_type(hid_t type) {
     default:
       return std::nullopt;
   }
+}
+
+/// It takes the word of a file, too, for where the members of a row are, all of which it moves about. `type` is
+/// compound.
+bool are_sound_rows(hid_t type) {
+  std::vector<std::pair<std::size_t, std::size_t>> members;  // begin, size
+  for (int i = 0; i < H5Tget_nmembers(type); ++i) {
+    const auto index = static_cast<unsigned>(i);
+    const auto member = own(H5Tget_member_type(type, index), H5Tclose);
+    const H5T_class_t kind = H5Tget_class(member.get());
+    const bool is_number = kind == H5T_INTEGER || kind == H5T_FLOAT;
+    const bool is_text = kind == H5T_STRING && H5Tis_variable_str(member.get()) == 0;
+    if (!is_text && !(is_number && is_sound_number(member.get()))) return false;
+    members.emplace_back(H5Tget_member_offset(type, index), H5Tget_size(member.get()));
+  }
+  std::sort(members.begin(), members.end());
+  std::size_t end = 0;
+  for (const auto& [begin, size] : members) {
+    if (begin < end) return false;
+    end = begin + size;
+  }
+  return end <= H5Tget_size(type);
 }
 
 std::string filter_name(H5Z_filter_t id) {
@@ -138,6 +174,10 @@ bool Hdf5Handle::reset() {
 
 std::size_t size_of(NumberType type) { return H5Tget_size(memory_type(type)); }
 
+Hdf5Handle Hdf5File::opened(const std::string& path) {
+  return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+}
+
 Expected<Hdf5File> Hdf5File::open(const std::string& path) {
   prepare();
   const auto plain = open_to_read(path);
@@ -149,7 +189,11 @@ Expected<Hdf5File> Hdf5File::open(const std::string& path) {
   Hdf5File file;
   file.path_ = path;
   file.size_ = plain->size;
-  file.id_ = own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  const auto tried = [&file, &path] {
+    file.id_ = opened(path);
+    if (file.id_) file.read_through();
+  };
+  if (survives(path, tried)) file.id_ = opened(path);
   if (!file.id_)
     return Error{path, text("truncated or damaged HDF5 file (", plain->size, " bytes)"), "copy it again"};
   return file;
@@ -240,6 +284,10 @@ Status Hdf5File::open_dataset(const std::string& name, int dimensions, Hdf5Datas
   if (bytes > most)
     return Error{where, text("claims ", bytes, " bytes, the file has ", size_),
                  "the file is damaged; copy it again"};
+  // The library reads a dataset inside of its header as far as the shape says, from wherever its content ends.
+  const bool compact = H5Pget_layout(properties.get()) == H5D_COMPACT;
+  if (compact && static_cast<double>(H5Dget_storage_size(out.id_.get())) < bytes)
+    return Error{where, text("claims ", bytes, " bytes and holds fewer"), "the file is damaged; copy it again"};
   return {};
 }
 
@@ -266,6 +314,8 @@ Expected<Hdf5Dataset> Hdf5File::table(const std::string& name, std::span<const H
   const auto type = own(H5Dget_type(out.id_.get()), H5Tclose);
   if (H5Tget_class(type.get()) != H5T_COMPOUND)
     return Error{where, "is not a table", "is it the right file?"};
+  if (!are_sound_rows(type.get()))
+    return Error{where, "its rows are not numbers and texts one after the other", "is it the right file?"};
   out.row_type_ = own(H5Tcreate(H5T_COMPOUND, row_bytes), H5Tclose);
   for (const Hdf5Field& field : fields) {
     const int index = H5Tget_member_index(type.get(), field.name);

@@ -76,7 +76,7 @@ class Hdf5Dataset {
 /// An HDF5 file, to be read or being written. The library's own messages are silenced.
 class Hdf5File {
  public:
-  /// Errors: no such file, no HDF5, truncated.
+  /// Errors: no such file, no HDF5, truncated, so damaged that the library breaks down over it.
   static Expected<Hdf5File> open(const std::string& path);
   /// Writes to the temporary file, whose target errors name. In the format of HDF5 1.10, whose structure
   /// carries checksums of its own; no time stamps, so that same content gives same bytes.
@@ -119,6 +119,10 @@ class Hdf5File {
   Status close();
 
  private:
+  static Hdf5Handle opened(const std::string& path);
+  /// All that the library is ever asked of a file, for nothing: every object, its attributes, the outermost
+  /// rows of datasets.
+  void read_through() const;
   Error failed(const std::string& what) const;
   Status open_dataset(const std::string& name, int dimensions, Hdf5Dataset& out) const;
 

@@ -110,6 +110,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       last_update_(start.t),
       pieces_(cut_contours(*setup_.map)),
       alignment_(setup_.camera->size(), config.alignment, pieces_.count) {
+  if (config.fusion.slow.piece_offset)
+    offset_pieces_ = cut_contours(*setup_.map, config.fusion.slow.piece_m).of_point;
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
   before_search_ = fusion_->state();
@@ -380,7 +382,8 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
         const ContourSample& s = samples_[offset.sample];
         contours_.push_back({predicted.inverse() * setup_.map->position(s.point),
                              predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()),
-                             offset.offset_px, offset.weight});
+                             offset.offset_px, offset.weight,
+                             offset_pieces_.empty() ? s.piece : offset_pieces_[s.point]});
       }
     return {{r.information, r.vector},
             static_cast<int>(samples_.size()),

@@ -171,6 +171,7 @@ class Tracker {
   std::deque<EventPacket> waiting_;  ///< events that arrived before their IMU samples
   std::size_t waiting_from_ = 0;     ///< consumed part of the first
   ContourPieces pieces_;
+  std::vector<std::uint32_t> offset_pieces_;  ///< of each map point, where the pieces have offsets
   EventAlignment alignment_;
   std::vector<AlignmentPoint> points_;   ///< of the exponential field
   std::vector<ContourSample> samples_;   ///< of the events' alignment

@@ -34,6 +34,7 @@ const std::vector<Variant> kBackEnds{
      {"fusion.kind=graph", "fusion.coupling=tight", "fusion.window.background=true"}},
     {"EKF, gravity's direction", true, {"fusion.slow.gravity=true"}},
     {"EKF, lasting offset", true, {"fusion.slow.pose_offset=true", "alignment.shared_s=0"}},
+    {"EKF, offsets of pieces", true, {"fusion.slow.piece_offset=on"}},
 };
 
 const std::vector<Variant> kAblation{

@@ -57,9 +57,12 @@ void describe(ConfigTable& table, SlowErrorsConfig& c) {
   table.add("offset_position_sigma_m", c.offset_position_sigma_m, "m", "its size, 1 sigma", {0, 1});
   table.add("offset_rotation_sigma_rad", c.offset_rotation_sigma_rad, "rad", "its size, 1 sigma", {0, 1});
   table.add("offset_s", c.offset_s, "s", "its correlation time", {1e-3, 1000});
-  table.add("piece_offset", c.piece_offset,
-            "estimate the offset of each contour piece (ekf); not together with other slow errors or calibration");
-  table.add("piece_sigma_m", c.piece_sigma_m, "m", "its size, 1 sigma", {1e-6, 1});
+  table.add(
+      "piece_offset", c.piece_offset,
+      {{"off", PieceOffsets::off}, {"on", PieceOffsets::on}, {"auto", PieceOffsets::automatic}},
+      "estimate the offset of each contour piece (ekf, without other slow errors and calibration); auto: of "
+      "maps that state errors");
+  table.add("piece_sigma_m", c.piece_sigma_m, "m", "its size, 1 sigma, beside what the map states", {1e-6, 1});
   table.add("piece_m", c.piece_m, "m", "length of a piece", {1e-2, 100});
   table.add("most_pieces", c.most_pieces, "", "so many at a time", {1, 1000});
 }
@@ -80,12 +83,24 @@ void describe(ConfigTable& table, CalibrationConfig& c) {
             {0, 100});
 }
 
+Expected<PieceOffsets> settled(const FusionConfig& config, bool map_states_errors) {
+  const CalibrationConfig& c = config.calibration;
+  const bool possible = config.kind == BackEndKind::ekf && !config.slow.gravity && !config.slow.pose_offset &&
+                        !c.time_offset && !c.rotation && !c.translation;
+  if (config.slow.piece_offset == PieceOffsets::on && !possible)
+    return Error{"fusion.slow.piece_offset", "on needs fusion.kind=ekf without calibration and other slow errors",
+                 "leave one of them out"};
+  if (config.slow.piece_offset != PieceOffsets::automatic) return config.slow.piece_offset;
+  return possible && map_states_errors ? PieceOffsets::on : PieceOffsets::off;
+}
+
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,
                                        const Pose& T_body_cam) {
   const Motion motion(model, config, noise);
   switch (config.kind) {
     case BackEndKind::ekf:
-      if (config.slow.piece_offset) return std::make_unique<PieceEkf>(motion, config.slow);
+      if (config.slow.piece_offset == PieceOffsets::on)
+        return std::make_unique<PieceEkf>(motion, config.slow);
       return std::make_unique<Ekf>(motion, config.calibration, config.slow, T_body_cam);
     case BackEndKind::graph:
       return std::make_unique<Graph>(motion, config.window, config.coupling);

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "evpose/core/error.h"
 #include "evpose/fusion/motion.h"
 #include "evpose/fusion/state.h"
 #include "evpose/imu/imu.h"
@@ -48,6 +49,10 @@ struct CalibrationConfig {
 };
 void describe(ConfigTable& table, CalibrationConfig& config);
 
+/// Whether offsets of single contour pieces are states, then the only slow errors; automatic: where the map
+/// states errors of its contours, as one that was built from a cloud.
+enum class PieceOffsets { off, on, automatic };
+
 /// Errors that last, as states of BackEndKind::ekf.
 struct SlowErrorsConfig {
   bool gravity = false;  ///< the map does not stand upright: direction of gravity in it
@@ -56,10 +61,10 @@ struct SlowErrorsConfig {
   double offset_position_sigma_m = 5e-4;
   double offset_rotation_sigma_rad = 2e-4;
   double offset_s = 0.3;  ///< its correlation time
-  bool piece_offset = false;  ///< offset of each contour piece; then none of the above
-  double piece_sigma_m = 1e-3;
-  double piece_m = 0.3;    ///< length of a piece
-  int most_pieces = 100;   ///< that are states at a time
+  PieceOffsets piece_offset = PieceOffsets::automatic;
+  double piece_sigma_m = 6e-3;  ///< beside what the map states: some pieces stand on another edge
+  double piece_m = 0.6;         ///< length of a piece
+  int most_pieces = 200;        ///< that are states at a time
 };
 void describe(ConfigTable& table, SlowErrorsConfig& config);
 
@@ -139,7 +144,10 @@ class BackEnd {
   Motion motion_;
 };
 
-/// `T_body_cam` as given: used by the calibration alone.
+/// What `automatic` means for this map, and whether `on` can be had.
+Expected<PieceOffsets> settled(const FusionConfig& config, bool map_states_errors);
+
+/// `T_body_cam` as given: used by the calibration alone. Offsets of pieces must be settled.
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,
                                        const Pose& T_body_cam);
 

@@ -58,7 +58,7 @@ int PieceEkf::place_of(const ContourOffset& contour, const Eigen::Vector3d& acro
   cross_.col(place).setZero();
   spread_.row(place).setZero();
   spread_.col(place).setZero();
-  spread_(place, place) = config_.piece_sigma_m * config_.piece_sigma_m;
+  spread_(place, place) = config_.piece_sigma_m * config_.piece_sigma_m + contour.sigma_m * contour.sigma_m;
   return static_cast<int>(place);
 }
 

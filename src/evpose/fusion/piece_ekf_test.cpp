@@ -18,7 +18,7 @@ FusionConfig some_config(int most_pieces = 100) {
   FusionConfig config;
   config.start_position_sigma_m = kStartSigma_m;
   config.start_rotation_sigma_rad = kStartSigma_rad;
-  config.slow.piece_offset = true;
+  config.slow.piece_offset = PieceOffsets::on;
   config.slow.piece_sigma_m = kPieceSigma_m;
   config.slow.most_pieces = most_pieces;
   return config;

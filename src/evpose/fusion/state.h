@@ -55,6 +55,7 @@ struct ContourOffset {
   double offset_px = 0;         ///< by which the point should move against `across_body`
   double weight = 0;            ///< px^-2
   std::uint32_t piece = 0;      ///< of the contours, as the back end has them cut
+  double sigma_m = 0;           ///< error of the contour that the map states
 };
 
 /// The sum over the contours, made anew at another pose: the points turn and shift with it exactly, their

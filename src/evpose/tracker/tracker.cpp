@@ -18,6 +18,15 @@ double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
   return (low.cast<double>() - relative).cwiseMax(relative - high.cast<double>()).cwiseMax(0).norm();
 }
 
+/// As maps that are built from clouds do.
+bool states_errors(const ContourMap& map) {
+  const auto counts = [](const ContourPoint& point) { return !is_mark(point.kind); };
+  const auto states = [](const ContourPoint& point) { return !is_mark(point.kind) && point.sigma > 0; };
+  const auto& points = map.points;
+  return 2 * std::count_if(points.begin(), points.end(), states) >
+         std::count_if(points.begin(), points.end(), counts);
+}
+
 /// Each field has its own choice of points.
 VisibleSetConfig spread(const TrackerConfig& config) {
   VisibleSetConfig out = config.visible;
@@ -87,7 +96,11 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
                  text("(", start.T_map_body.p.x(), ", ", start.T_map_body.p.y(), ", ", start.T_map_body.p.z(),
                       ") m is ", outside, " m off the map, which is seen up to ", config.visible.far_m, " m"),
                  "check that map and start pose share one frame (frames.T_map_world in recording.yaml)"};
-  return std::unique_ptr<Tracker>(new Tracker(setup, config, start, std::move(clock)));
+  TrackerConfig settled_config = config;
+  const auto pieces = settled(config.fusion, states_errors(map));
+  if (!pieces) return pieces.error();
+  settled_config.fusion.slow.piece_offset = *pieces;
+  return std::unique_ptr<Tracker>(new Tracker(setup, settled_config, start, std::move(clock)));
 }
 
 Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start,
@@ -110,7 +123,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       last_update_(start.t),
       pieces_(cut_contours(*setup_.map)),
       alignment_(setup_.camera->size(), config.alignment, pieces_.count) {
-  if (config.fusion.slow.piece_offset)
+  if (config.fusion.slow.piece_offset == PieceOffsets::on)
     offset_pieces_ = cut_contours(*setup_.map, config.fusion.slow.piece_m).of_point;
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
@@ -383,7 +396,8 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
         contours_.push_back({predicted.inverse() * setup_.map->position(s.point),
                              predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()),
                              offset.offset_px, offset.weight,
-                             offset_pieces_.empty() ? s.piece : offset_pieces_[s.point]});
+                             offset_pieces_.empty() ? s.piece : offset_pieces_[s.point],
+                             setup_.map->points[s.point].sigma});
       }
     return {{r.information, r.vector},
             static_cast<int>(samples_.size()),

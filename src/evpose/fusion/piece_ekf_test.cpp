@@ -170,5 +170,18 @@ TEST(PieceEkf, ThePieceNotSeenForLongestGivesWay) {
   EXPECT_TRUE(filter.state().covariance.allFinite());
 }
 
+TEST(PieceEkf, IsTheFilterOfMapsThatStateErrorsUnlessMoreIsAskedFor) {
+  FusionConfig config;
+  EXPECT_EQ(*settled(config, true), PieceOffsets::on);
+  EXPECT_EQ(*settled(config, false), PieceOffsets::off);
+  config.calibration.rotation = true;
+  EXPECT_EQ(*settled(config, true), PieceOffsets::off);
+  config.slow.piece_offset = PieceOffsets::on;
+  ASSERT_FALSE(settled(config, true).ok());
+  EXPECT_NE(settled(config, true).error().line().find("fusion.slow.piece_offset"), std::string::npos);
+  config.calibration.rotation = false;
+  EXPECT_EQ(*settled(config, false), PieceOffsets::on);
+}
+
 }  // namespace
 }  // namespace evpose

@@ -270,5 +270,33 @@ TEST_F(BadInput, AFocalLengthThatIsWrongByATwentiethIsNotAGoodPose) {
         << all_reasons();
 }
 
+// As in a map built from a cloud: each contour stands off by some millimetres, and says so.
+TEST_F(BadInput, WhereContoursStandOffIsLearntFromTheirEvents) {
+  ContourMap map = boxes();
+  std::mt19937 random(5);
+  std::normal_distribution<float> off(0, 4e-3F);
+  Eigen::Vector3f shift = Eigen::Vector3f::Zero();
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    ContourPoint& p = map.points[i];
+    if (i == 0 || map.points[i - 1].contour != p.contour)
+      shift = off(random) * p.normal + off(random) * p.normal.cross(p.tangent);
+    p.position += shift;
+    p.sigma = 4e-3F;
+  }
+  setup_.map = std::make_shared<const ContourMap>(map);
+  const auto mean_error_m = [&](PieceOffsets offsets) {
+    config_.fusion.slow.piece_offset = offsets;
+    updates_.clear();
+    fly(boxes(), 2.0);
+    double sum = 0;
+    int count = 0;
+    for (const Update& u : updates_)
+      if (to_seconds(u.t - kStart_ns) > 1) sum += error_m(u), ++count;
+    return sum / count;
+  };
+  const double learnt = mean_error_m(PieceOffsets::automatic), plain = mean_error_m(PieceOffsets::off);
+  EXPECT_LT(learnt, 0.6 * plain) << plain;
+}
+
 }  // namespace
 }  // namespace evpose

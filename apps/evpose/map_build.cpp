@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <thread>
 
 #include "commands.h"
@@ -13,6 +14,7 @@
 #include "evpose/io/config_yaml.h"
 #include "evpose/io/contour_files.h"
 #include "evpose/io/map_h5.h"
+#include "evpose/io/trajectory_tum.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
 #include "interrupt.h"
@@ -90,8 +92,7 @@ void print_score(const char* name, const KindScore& s) {
       s.sigma_ratio, s.sigma_bulk, 100 * s.outliers);
 }
 
-void print_classes(const char* name, const char* unit, double scale,
-                   const std::array<RecallClass, 4>& classes) {
+void print_classes(const char* name, const char* unit, double scale, std::span<const RecallClass> classes) {
   std::printf("%s", name);
   for (const RecallClass& c : classes)
     std::printf("   from %.3g %s: %.0f m, %.0f, %.0f", scale * c.from, unit, c.true_m, 100 * c.recall_5mm,
@@ -99,18 +100,30 @@ void print_classes(const char* name, const char* unit, double scale,
   std::printf("\n");
 }
 
-int compare(const std::string& built_path, const std::string& true_path, const std::string& cloud_path) {
-  const auto built = read_contour_map(built_path);
+struct CompareRequest {
+  std::string built, truth, cloud, flown;
+};
+
+int compare(const CompareRequest& request) {
+  const auto built = read_contour_map(request.built);
   if (!built) return bad_input(built.error());
-  const auto truth = read_contour_map(true_path);
+  const auto truth = read_contour_map(request.truth);
   if (!truth) return bad_input(truth.error());
   PointCloud cloud;
-  if (!cloud_path.empty()) {
-    auto read = read_cloud(cloud_path);
+  if (!request.cloud.empty()) {
+    auto read = read_cloud(request.cloud);
     if (!read) return bad_input(read.error());
     cloud = *std::move(read);
   }
-  const MapScore score = score_map(*built, *truth, cloud_path.empty() ? nullptr : &cloud, {});
+  MapScoreConfig config;
+  if (!request.flown.empty()) {
+    const auto poses = read_tum(request.flown);
+    if (!poses) return bad_input(poses.error());
+    constexpr std::size_t kPlaces = 200;  // are enough for a distance
+    for (std::size_t k = 0, step = poses->size() / kPlaces + 1; k < poses->size(); k += step)
+      config.flown.push_back((*poses)[k].pose.p);
+  }
+  const MapScore score = score_map(*built, *truth, request.cloud.empty() ? nullptr : &cloud, config);
   std::printf(
       "          built m   true m  precision %%    recall %%      distance mm         direction deg   error "
       "/ sigma\n"
@@ -125,6 +138,7 @@ int compare(const std::string& built_path, const std::string& true_path, const s
       score.short_m, score.unseen_m);
   print_classes("  by length          ", "m", 1, score.by_length);
   print_classes("  by parallel edge at", "cm", 100, score.by_rival);
+  if (!config.flown.empty()) print_classes("  by distance flown  ", "m", 1, score.by_way);
   return 0;
 }
 
@@ -151,13 +165,15 @@ void add_map_build(CLI::App& map, std::function<int()>& run) {
 }
 
 void add_map_compare(CLI::App& map, std::function<int()>& run) {
-  auto paths = std::make_shared<std::array<std::string, 3>>();
+  auto request = std::make_shared<CompareRequest>();
   auto* command = map.add_subcommand("compare", "How near the contours of a map are to the true ones");
-  command->add_option("built", (*paths)[0], "map or contours to judge")->required();
-  command->add_option("true", (*paths)[1], "true contours")->required();
-  command->add_option("--cloud", (*paths)[2],
+  command->add_option("built", request->built, "map or contours to judge")->required();
+  command->add_option("true", request->truth, "true contours")->required();
+  command->add_option("--cloud", request->cloud,
                       "cloud it was built from: true edges that it did not see do not count");
-  command->callback([=, &run] { run = [=] { return compare((*paths)[0], (*paths)[1], (*paths)[2]); }; });
+  command->add_option("--flown", request->flown,
+                      "trajectory (TUM) in the map's frame: recall by the distance from it, too");
+  command->callback([=, &run] { run = [=] { return compare(*request); }; });
 }
 
 }  // namespace evpose

@@ -379,6 +379,24 @@ TEST(MapScore, SigmaOfTheBulkIsToldApartFromWrongEdgesAndMarksDoNotCount) {
   EXPECT_NEAR(all.built_m, 18, 1e-3);
 }
 
+TEST(MapScore, RecallIsToldByTheNextParallelEdgeAndByTheDistanceFromWhatWasFlown) {
+  ContourMap truth = straight_contour(0, 2, 0);
+  for (const auto& p : straight_contour(0, 1, 0.2).points) truth.points.push_back(p);
+  MapScoreConfig config;
+  config.flown = {{-3, 0, 0}, {-9, 0, 0}};
+  const MapScore score = score_map(straight_contour(0, 1, 0), truth, nullptr, config);
+  // Half of the first edge and all of the second have another 20 cm beside them.
+  EXPECT_NEAR(score.by_rival[4].true_m, 2, 0.05);
+  EXPECT_NEAR(score.by_rival[4].recall_5mm, 0.5, 0.02);
+  EXPECT_NEAR(score.by_rival[5].true_m, 1, 0.05);
+  EXPECT_NEAR(score.by_rival[5].recall_5mm, 0, 0.05);
+  // The first metre of both is 3 to 4 m off, the second of one 4 to 5 m.
+  EXPECT_NEAR(score.by_way[1].true_m, 2, 0.05);
+  EXPECT_NEAR(score.by_way[1].recall_5mm, 0.5, 0.02);
+  EXPECT_NEAR(score.by_way[2].true_m, 1, 0.05);
+  EXPECT_NEAR(score.by_way[2].recall_5mm, 0, 0.05);
+}
+
 TEST(MapScore, ShortAndUnseenEdgesDoNotCount) {
   ContourMap truth = straight_contour(0, 2, 0);
   for (const auto& p : straight_contour(5, 5.2, 0).points) truth.points.push_back(p);

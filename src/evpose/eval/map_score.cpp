@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <span>
 
 #include "evpose/io/point_grid.h"
 #include "evpose/map/point_cloud.h"
@@ -12,10 +13,10 @@
 namespace evpose {
 namespace {
 
-constexpr float kLink_m = 0.035F;          // true points so near to each other, in line, are of one edge
-constexpr float kSameEdge_m = 0.003F;      // ... and those so near across it
-constexpr double kOutlierSigma = 3.5;      // one in 450 by chance
-constexpr float kFurthestRival_m = 0.08F;  // parallel edges further apart do not disturb each other
+constexpr float kLink_m = 0.035F;         // true points so near to each other, in line, are of one edge
+constexpr float kSameEdge_m = 0.003F;     // ... and those so near across it
+constexpr double kOutlierSigma = 3.5;     // one in 450 by chance
+constexpr float kFurthestRival_m = 0.3F;  // parallel edges further apart do not disturb each other
 
 std::vector<Eigen::Vector3f> positions(const ContourMap& map, const Eigen::Vector3d& anchor) {
   std::vector<Eigen::Vector3f> out;
@@ -65,14 +66,20 @@ std::vector<float> rivals_of(const ContourMap& map, const std::vector<Eigen::Vec
   return out;
 }
 
-void count(std::array<RecallClass, 4>& classes, double value, double weight, double across_m) {
+double distance_m(const std::vector<Eigen::Vector3d>& places, const Eigen::Vector3d& x) {
+  double least = INFINITY;
+  for (const auto& place : places) least = std::min(least, (place - x).squaredNorm());
+  return std::sqrt(least);
+}
+
+void count(std::span<RecallClass> classes, double value, double weight, double across_m) {
   std::size_t k = classes.size() - 1;
   while (k > 0 && value < classes[k].from) --k;
   classes[k].true_m += weight;
   classes[k].recall_5mm += across_m <= 0.005 ? weight : 0;
   classes[k].recall_10mm += across_m <= 0.010 ? weight : 0;
 }
-void finish(std::array<RecallClass, 4>& classes) {
+void finish(std::span<RecallClass> classes) {
   for (RecallClass& c : classes)
     if (c.true_m > 0) c.recall_5mm /= c.true_m, c.recall_10mm /= c.true_m;
 }
@@ -223,10 +230,13 @@ MapScore score_map(const ContourMap& judged, const ContourMap& truth, const Poin
     all.truth(weight, match);
     count(out.by_length, length, weight, match.across_m);
     count(out.by_rival, static_cast<double>(rivals[i]), weight, match.across_m);
+    if (!config.flown.empty())
+      count(out.by_way, distance_m(config.flown, truth.position(i)), weight, match.across_m);
     if (Tally* tally = of_kind(p.kind)) tally->truth(weight, match);
   }
   finish(out.by_length);
   finish(out.by_rival);
+  finish(out.by_way);
   out.all = all.finish();
   out.crease = crease.finish();
   out.boundary = boundary.finish();

@@ -11,11 +11,12 @@ namespace evpose {
 struct PointCloud;
 
 struct MapScoreConfig {
-  double long_m = 0.3;          ///< true edges shorter than this do not count for recall
-  double reach_m = 0.03;        ///< contours further apart are different ones
-  double direction_rad = 0.26;  ///< so are those that differ more in direction
-  double seen_radius_m = 0.05;  ///< a true point was seen if the cloud, unless it is sparse, has ...
-  int seen_points = 6;          ///< ... so many points within the radius
+  double long_m = 0.3;                 ///< true edges shorter than this do not count for recall
+  double reach_m = 0.03;               ///< contours further apart are different ones
+  double direction_rad = 0.26;         ///< so are those that differ more in direction
+  double seen_radius_m = 0.05;         ///< a true point was seen if the cloud, unless it is sparse, has ...
+  int seen_points = 6;                 ///< ... so many points within the radius
+  std::vector<Eigen::Vector3d> flown;  ///< places, to tell recall by the distance from the nearest of them
 };
 
 /// Shares and distances are weighted by length.
@@ -40,9 +41,11 @@ struct RecallClass {
 struct MapScore {
   KindScore all, crease, boundary;
   std::array<RecallClass, 4> by_length{{{0.3}, {0.6}, {1.2}, {2.4}}};
-  /// By the distance of the nearest other true edge that runs parallel. The noise of clouds is of this size.
-  std::array<RecallClass, 4> by_rival{{{0}, {0.03}, {0.05}, {0.08}}};
-  double unseen_m = 0, short_m = 0;  ///< true contours that do not count for recall
+  /// By the distance of the nearest other true edge that runs parallel: mostly the width of the narrower face
+  /// at the edge, which a cloud must show in spite of its noise and with its spacing.
+  std::array<RecallClass, 6> by_rival{{{0}, {0.03}, {0.05}, {0.08}, {0.15}, {0.3}}};
+  std::array<RecallClass, 4> by_way{{{0}, {2}, {4}, {8}}};  ///< from what was flown; empty without
+  double unseen_m = 0, short_m = 0;                         ///< true contours that do not count for recall
 };
 
 /// Compares contours point by point. The distance from a true contour is that across it. `cloud`: what the

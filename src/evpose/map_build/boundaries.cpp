@@ -243,7 +243,7 @@ Traced BoundaryFinder::side(const Ring& ring, std::size_t number, const std::vec
   const Eigen::Vector2d &from = ring.coarse[number], &to = ring.coarse[(number + 1) % ring.coarse.size()];
   if (explained(from, to, creases_)) return {};
   const auto [a, b] = without(arcs, from, to);
-  const Traced left_out{{}, (b - a).norm()};
+  Traced left_out{{}, (b - a).norm()};
   if (left_out.left_out_m < least_side_m()) return left_out;
   const auto shadow = [&](Piece piece) {
     piece.kind = ContourKind::shadow;

@@ -68,7 +68,7 @@ class CylinderFinder {
   std::optional<Model> bar_at(const std::vector<std::uint32_t>& points) const;
   std::optional<Model> around(const Axis& axis, const std::vector<std::uint32_t>& points) const;
   std::optional<Model> column_at(const std::vector<std::uint32_t>& points) const;
-  std::optional<Model> refined(const Model& model, const std::vector<std::uint32_t>& points) const;
+  std::optional<Model> refined(const Model& start, const std::vector<std::uint32_t>& points) const;
   struct Followed {
     std::vector<std::uint32_t> points;
     double first = 0, last = 0;  ///< along the axis

@@ -184,7 +184,7 @@ StepFit EdgeFitter::settle(Edge& edge) const {
   return best;
 }
 
-FittedEdge EdgeFitter::fit(Edge edge) const {
+FittedEdge EdgeFitter::fit(const Edge& edge) const {
   FittedEdge out;
   out.edge = edge;
   const double noise = surface_.scale.noise_m;

@@ -48,7 +48,7 @@ class EdgeFitter {
   /// `cell_m`: of the outline that the edges are from. Keeps references.
   EdgeFitter(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane, double cell_m,
              double most_blur_noise);
-  FittedEdge fit(Edge edge) const;
+  FittedEdge fit(const Edge& edge) const;
   const PlaneFrame& frame() const { return frame_; }
 
  private:

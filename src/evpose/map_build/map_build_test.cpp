@@ -363,7 +363,7 @@ TEST(StepFit, TheTrueSoftnessIsTheLikeliest) {
 /// Points around an edge (along, outwards, over the plane) of a plane that ends at y = 0, of a face of
 /// `depth` that hangs from it, and of what is under that; blurred along a ray of unit `ray`.
 std::vector<Eigen::Vector3d> section_points(unsigned seed, double depth, bool under,
-                                            const Eigen::Vector2d& ray) {
+                                            const Eigen::Vector2d& ray, int on_plane = 700) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, kNoise);
   std::uniform_real_distribution<double> t(-0.5, 0.5), y(-0.2, 0), z(-depth, 0);
@@ -372,7 +372,7 @@ std::vector<Eigen::Vector3d> section_points(unsigned seed, double depth, bool un
     const Eigen::Vector2d p = Eigen::Vector2d(across, over) + noise(random) * ray;
     if (std::abs(p.x()) < 0.09 && std::abs(p.y()) < 0.09) out.emplace_back(along, p.x(), p.y());
   };
-  for (int i = 0; i < 700; ++i) add(t(random), y(random), 0);
+  for (int i = 0; i < on_plane; ++i) add(t(random), y(random), 0);
   for (int i = 0; i < static_cast<int>(5000 * depth); ++i) add(t(random), 0, z(random));
   for (int i = 0; under && i < 400; ++i) add(t(random), y(random), -depth);
   return out;
@@ -390,12 +390,13 @@ TEST(SectionFit, AFaceNarrowerThanItIsNoisyDoesNotPushTheEdge) {
     EXPECT_TRUE(fit.ends);
     EXPECT_GT(fit.gain, 20);
     EXPECT_LT(fit.rest_share, 0.1);
-    place += std::pow(fit.place / fit.sigma_place, 2) / kTrials;
+    const double stated = std::hypot(fit.sigma_place, 0.1 * kNoise);  // a contour's: it never says less
+    place += std::pow(fit.place / stated, 2) / kTrials;
     depth += std::pow((fit.depth - 0.025) / fit.sigma_depth, 2) / kTrials;
     EXPECT_LT(std::abs(fit.place), 0.004);
     EXPECT_LT(std::abs(fit.depth - 0.025), 0.012);
   }
-  EXPECT_LT(place, 4);
+  EXPECT_LT(place, 2);
   EXPECT_LT(depth, 4);
 }
 
@@ -413,13 +414,25 @@ TEST(SectionFit, TheOtherWayUpIsTheSameFaceOnTheOtherSide) {
 }
 
 TEST(SectionFit, APlaneThatMerelyEndsHasNoFace) {
-  const SectionWindow window{0.5, 0.09, 0.09, kNoise, kNoise, 0.005};
   for (unsigned seed = 0; seed < 8; ++seed)
     for (const double angle : {0.0, 0.7, 1.2}) {
+      const SectionWindow window{0.5, 0.09, 0.09, kNoise, kNoise * std::cos(angle), 0.005};
       const SectionFit fit =
           fit_section(section_points(seed, 0, false, {std::sin(angle), std::cos(angle)}), window);
       EXPECT_LT(fit.gain, 10) << seed << " " << angle;
       EXPECT_TRUE(fit.side != 0 || std::abs(fit.place) < 0.01);
+    }
+}
+
+TEST(SectionFit, PointsThatLeanAlongTheirRaysAreNoFace) {
+  // A ceiling seen askew over a beam: its last points are lifted and shifted at once.
+  for (unsigned seed = 0; seed < 6; ++seed)
+    for (const double angle : {-1.0, -0.6, 0.6, 1.0}) {
+      const SectionWindow window{0.5, 0.09, 0.09, kNoise, kNoise * std::cos(angle), 0.005};
+      const SectionFit fit =
+          fit_section(section_points(seed, 0, false, {std::sin(angle), std::cos(angle)}, 4000), window);
+      EXPECT_LT(fit.gain, 10) << seed << " " << angle;
+      EXPECT_LT(std::abs(fit.place), 0.004) << seed << " " << angle;
     }
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
@@ -119,6 +120,8 @@ double typical_roughness(const Planes& planes) {
 void describe(ConfigTable& table, BuildConfig& c) {
   table.add("normal_sigma", c.patch.normal_sigma_rad, "rad", "to which a patch's normal must be known",
             {0.001, 0.5});
+  table.add("noise", c.patch.noise_m, "m", "of a point across its surface, 1 sigma; 0: that of most patches",
+            {0, 0.15});
   table.add("most_neighbours", c.patch.most, "", "points of a patch", {12, 1000});
   table.add("plane_angle", c.plane.angle_rad, "rad", "most between a point's normal and its plane",
             {0.01, 1});
@@ -244,7 +247,11 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
       given_up = !progress((static_cast<double>(k) + done) / static_cast<double>(tiles.size()));
       return !given_up;
     };
-    PointCloud part = tiles.size() == 1 ? std::move(cloud) : part_of(cloud, tiles[k]);
+    PointCloud part;
+    if (tiles.size() == 1)
+      std::swap(part, cloud);
+    else
+      part = part_of(cloud, tiles[k]);
     if (!share(0)) return kGivenUp;
     if (const Status done = build_tile(std::move(part), tiles[k], config, pool, views, share, out); !done) {
       if (given_up) return kGivenUp;

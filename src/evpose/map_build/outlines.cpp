@@ -155,7 +155,7 @@ void keep_corners(const std::vector<Eigen::Vector2d>& ring, std::size_t begin, s
   while (!open.empty()) {
     const auto [first, last] = open.back();
     open.pop_back();
-    const Eigen::Vector2d a = ring[first], b = ring[last % ring.size()];
+    const Eigen::Vector2d &a = ring[first], &b = ring[last % ring.size()];
     const double length = (b - a).norm();
     double furthest = tolerance;
     std::size_t at = 0;

@@ -301,9 +301,16 @@ SectionFit fit_section(std::span<const Eigen::Vector3d> all, const SectionWindow
       return now.log_likelihood > best.log_likelihood ? now : best;
     };
     for (const double across : {0.35, 0.7, 1.4}) best = blurred(across * window.noise_m, 0);
-    for (const double across : {1.0, 1.0 / 0.7})
-      for (const double correlation : {-0.8, 0.8})
-        best = blurred(std::min(across * best.state.blur.across_m, 1.4 * window.noise_m), correlation);
+    for (const double correlation : {-0.6, 0.6}) best = blurred(best.state.blur.across_m, correlation);
+    const Blur rough = best.state.blur;
+    const auto wider = [&](double share, double correlation) {
+      return blurred(std::min(share * rough.across_m, 1.4 * window.noise_m), correlation);
+    };
+    for (const double share : {0.7, 1.4}) best = wider(share, rough.correlation);
+    // Of one ray they go together but for rounding, of rays from all sides not at all.
+    if (rough.correlation != 0)
+      for (const double share : {0.7, 0.85, 1.0, 1.2, 1.4})
+        best = wider(share, std::copysign(0.97, rough.correlation));
     for (double& density : best.state.density)
       density *= static_cast<double>(points.size()) / static_cast<double>(some.size());
     best.log_likelihood = section.improve(best.state, kMostRounds, kNoGain);

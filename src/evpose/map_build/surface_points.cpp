@@ -102,7 +102,7 @@ Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, c
                       " points; too sparse, or too noisy"),
                  "give a denser cloud"};
   CloudScale scale;
-  scale.noise_m = std::max(median(noise), 1e-5);
+  scale.noise_m = config.noise_m > 0 ? config.noise_m : std::max(median(noise), 1e-5);
   scale.spacing_m = std::max(median(spacing), 1e-5);
   // A disc of k points has the radius spacing sqrt(k / pi), a spread of half of it, and therefore a normal
   // known to 2 sqrt(pi) noise / (spacing k).

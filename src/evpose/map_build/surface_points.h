@@ -43,6 +43,9 @@ struct SurfacePoints {
 struct PatchConfig {
   double normal_sigma_rad = 0.05;
   int least = 12, most = 160;  ///< points of a patch
+  /// 1 sigma across surfaces, 0: that of the median patch, which is too little where most points lie on near
+  /// ground that is seen askew.
+  double noise_m = 0;
 };
 
 /// Spacing and noise from patches around a sample of points, each grown until it is flat. Errors: fewer than

@@ -62,7 +62,8 @@ void describe(ConfigTable& table, SlowErrorsConfig& c) {
       {{"off", PieceOffsets::off}, {"on", PieceOffsets::on}, {"auto", PieceOffsets::automatic}},
       "estimate the offset of each contour piece (ekf, without other slow errors and calibration); auto: of "
       "maps that state errors");
-  table.add("piece_sigma_m", c.piece_sigma_m, "m", "its size, 1 sigma, beside what the map states", {1e-6, 1});
+  table.add("piece_sigma_m", c.piece_sigma_m, "m", "its size, 1 sigma, beside what the map states",
+            {1e-6, 1});
   table.add("piece_m", c.piece_m, "m", "length of a piece", {1e-2, 100});
   table.add("most_pieces", c.most_pieces, "", "so many at a time", {1, 1000});
 }
@@ -88,7 +89,8 @@ Expected<PieceOffsets> settled(const FusionConfig& config, bool map_states_error
   const bool possible = config.kind == BackEndKind::ekf && !config.slow.gravity && !config.slow.pose_offset &&
                         !c.time_offset && !c.rotation && !c.translation;
   if (config.slow.piece_offset == PieceOffsets::on && !possible)
-    return Error{"fusion.slow.piece_offset", "on needs fusion.kind=ekf without calibration and other slow errors",
+    return Error{"fusion.slow.piece_offset",
+                 "on needs fusion.kind=ekf without calibration and other slow errors",
                  "leave one of them out"};
   if (config.slow.piece_offset != PieceOffsets::automatic) return config.slow.piece_offset;
   return possible && map_states_errors ? PieceOffsets::on : PieceOffsets::off;

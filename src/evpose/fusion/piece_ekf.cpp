@@ -135,7 +135,8 @@ void PieceEkf::update(const PoseInformation& measurement, std::span<const Contou
   // How the offsets, as they are known now, would shift a pose that this measurement alone told.
   pieces_share_.setZero();
   if (seen.empty()) return;
-  const Matrix6d damped = measurement.information + 1e-9 * measurement.information.trace() * Matrix6d::Identity();
+  const Matrix6d damped =
+      measurement.information + 1e-9 * measurement.information.trace() * Matrix6d::Identity();
   const Eigen::MatrixXd by_offsets = damped.ldlt().solve(H.topRightCorner(6, measured - 6));
   Eigen::MatrixXd spread(measured - 6, measured - 6);
   for (Eigen::Index i = 0; i < spread.rows(); ++i)

@@ -9,9 +9,9 @@ namespace evpose {
 
 /// Error-state Kalman filter whose further states are the offsets of single contour pieces: a piece stands
 /// elsewhere than the map says, or texture that moves with it is taken for it. An offset is one length, along
-/// the direction in the map across which the piece was seen first; with a view from elsewhere it counts by the
-/// cosine. Offsets do not change while a piece is in view; when there are more pieces than states, the one
-/// not seen for longest gives way, and what finds no state counts without an offset.
+/// the direction in the map across which the piece was seen first; with a view from elsewhere it counts by
+/// the cosine. Offsets do not change while a piece is in view; when there are more pieces than states, the
+/// one not seen for longest gives way, and what finds no state counts without an offset.
 class PieceEkf : public BackEnd {
  public:
   PieceEkf(const Motion& motion, const SlowErrorsConfig& config);

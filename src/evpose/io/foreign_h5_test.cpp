@@ -328,11 +328,12 @@ TEST(DsecH5, DamagedChunksAreAnError) {
 
 TEST(DsecH5, AFileThatBreaksTheLibraryDownIsRefused) {
   const TemporaryFolder folder;
-  write_dsec(folder / "a.h5", some_events(5000), 32015, [](const std::string& s, std::size_t) { return zstd(s); });
+  write_dsec(folder / "a.h5", some_events(5000), 32015,
+             [](const std::string& s, std::size_t) { return zstd(s); });
   ASSERT_TRUE(Hdf5File::open(folder / "a.h5").ok());
   std::string bytes = content_of(folder / "a.h5");
-  // The layout message of a dataset of one dimension in chunks, said to be of an older version: HDF5 1.10 divides
-  // by zero when it opens the dataset.
+  // The layout message of a dataset of one dimension in chunks, said to be of an older version: HDF5 1.10
+  // divides by zero when it opens the dataset.
   constexpr std::string_view message("\x08\0\x18\0\0\0\0\0\x03\x02\x02", 11);
   const auto at = bytes.find(message);
   ASSERT_NE(at, std::string::npos);

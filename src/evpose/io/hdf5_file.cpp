@@ -4,6 +4,8 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <limits>
 #include <type_traits>
 #include <utility>
@@ -54,7 +56,9 @@ hid_t memory_type(NumberType type) {
 /// The library takes the word of a file for where the bits of a number are.
 bool is_sound_number(hid_t type) {
   const std::size_t bits = 8 * H5Tget_size(type);
-  const auto within = [bits](std::size_t from, std::size_t count) { return from <= bits && count <= bits - from; };
+  const auto within = [bits](std::size_t from, std::size_t count) {
+    return from <= bits && count <= bits - from;
+  };
   const int offset = H5Tget_offset(type);
   if (offset < 0 || !within(static_cast<std::size_t>(offset), H5Tget_precision(type))) return false;
   if (H5Tget_class(type) != H5T_FLOAT) return true;
@@ -89,8 +93,8 @@ std::optional<NumberType> number_type(hid_t type) {
   }
 }
 
-/// It takes the word of a file, too, for where the members of a row are, all of which it moves about. `type` is
-/// compound.
+/// It takes the word of a file, too, for where the members of a row are, all of which it moves about. `type`
+/// is compound.
 bool are_sound_rows(hid_t type) {
   std::vector<std::pair<std::size_t, std::size_t>> members;  // begin, size
   for (int i = 0; i < H5Tget_nmembers(type); ++i) {
@@ -154,6 +158,18 @@ double chunk_bytes(hid_t properties, std::size_t item) {
   return bytes;
 }
 
+/// Bytes that the file has by its own word, if it is of the usual form; 0 otherwise.
+std::uint64_t claimed_bytes(std::FILE* file) {
+  std::array<unsigned char, 48> head{};
+  if (std::fread(head.data(), 1, head.size(), file) != head.size()) return 0;
+  const int version = head[8];
+  const bool known = version == 0 || version == 2 || version == 3;
+  if (!known || head[version == 0 ? 13 : 9] != 8) return 0;  // bytes of an address
+  std::uint64_t end = 0;
+  for (std::size_t i = 8; i-- > 0;) end = end << 8 | head[(version == 0 ? 40 : 28) + i];
+  return end;
+}
+
 }  // namespace
 
 Hdf5Handle::Hdf5Handle(Hdf5Handle&& other) noexcept
@@ -189,11 +205,13 @@ Expected<Hdf5File> Hdf5File::open(const std::string& path) {
   Hdf5File file;
   file.path_ = path;
   file.size_ = plain->size;
+  // A file that was cut, which is most of the damaged ones, costs no child.
+  const bool cut = claimed_bytes(plain->stream.get()) > static_cast<std::uint64_t>(plain->size);
   const auto tried = [&file, &path] {
     file.id_ = opened(path);
     if (file.id_) file.read_through();
   };
-  if (survives(path, tried)) file.id_ = opened(path);
+  if (!cut && survives(path, tried)) file.id_ = opened(path);
   if (!file.id_)
     return Error{path, text("truncated or damaged HDF5 file (", plain->size, " bytes)"), "copy it again"};
   return file;
@@ -284,10 +302,12 @@ Status Hdf5File::open_dataset(const std::string& name, int dimensions, Hdf5Datas
   if (bytes > most)
     return Error{where, text("claims ", bytes, " bytes, the file has ", size_),
                  "the file is damaged; copy it again"};
-  // The library reads a dataset inside of its header as far as the shape says, from wherever its content ends.
+  // The library reads a dataset inside of its header as far as the shape says, from wherever its content
+  // ends.
   const bool compact = H5Pget_layout(properties.get()) == H5D_COMPACT;
   if (compact && static_cast<double>(H5Dget_storage_size(out.id_.get())) < bytes)
-    return Error{where, text("claims ", bytes, " bytes and holds fewer"), "the file is damaged; copy it again"};
+    return Error{where, text("claims ", bytes, " bytes and holds fewer"),
+                 "the file is damaged; copy it again"};
   return {};
 }
 

@@ -393,11 +393,10 @@ Tracker::Registration Tracker::register_events(TimeNs t, const Pose& predicted, 
     if (fusion_->takes_contours())
       for (const SampleOffset& offset : alignment_.offsets()) {
         const ContourSample& s = samples_[offset.sample];
-        contours_.push_back({predicted.inverse() * setup_.map->position(s.point),
-                             predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()),
-                             offset.offset_px, offset.weight,
-                             offset_pieces_.empty() ? s.piece : offset_pieces_[s.point],
-                             setup_.map->points[s.point].sigma});
+        contours_.push_back(
+            {predicted.inverse() * setup_.map->position(s.point),
+             predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()), offset.offset_px, offset.weight,
+             offset_pieces_.empty() ? s.piece : offset_pieces_[s.point], setup_.map->points[s.point].sigma});
       }
     return {{r.information, r.vector},
             static_cast<int>(samples_.size()),

@@ -23,7 +23,7 @@ struct EventAlignmentConfig {
   double widest_gate_px = 0.55;    ///< ... opened by two sigma of the prediction, but to no more than this
   double event_sigma_px = 0.7;     ///< scatter of a contour's events about it
   double shared_sigma_px = 0.35;   ///< error that neighbouring events share (clutter, lateness)
-  double shared_s = 0.02;          ///< ... and that lasts so long
+  double shared_s = 0.025;         ///< ... and that lasts so long
   double map_sigma_m = 0.5e-3;     ///< of map points that state no sigma
   bool lateness = true;            ///< events come after the contour
   double lateness_from_px_s = 20;  ///< normal flow below which lateness fades out

@@ -37,6 +37,6 @@ SectionWindow section_window(double half_length, double noise_m, double rms_m, d
 /// whose surfaces are blurred by noise. Faces narrower than the noise mix their points with the plane's, and
 /// push an edge that is fitted to these alone outwards by as much as the noise; here each point is shared
 /// between the surfaces.
-SectionFit fit_section(std::span<const Eigen::Vector3d> points, const SectionWindow& window);
+SectionFit fit_section(std::span<const Eigen::Vector3d> all, const SectionWindow& window);
 
 }  // namespace evpose::map_build

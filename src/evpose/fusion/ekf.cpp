@@ -122,7 +122,7 @@ Ekf::BySlow Ekf::by_slow() const {
 }
 
 Matrix6d Ekf::measured_covariance() const {
-  const Matrix6d P = state_.pose_covariance();
+  Matrix6d P = state_.pose_covariance();
   if (!slow_) return P;
   const BySlow G = by_slow();
   const Matrix6d mixed = cross_.topRows<6>() * G.transpose();

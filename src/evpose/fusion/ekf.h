@@ -32,7 +32,7 @@ class Ekf : public BackEnd {
   using BySlow = Eigen::Matrix<double, 6, 15>;
   /// Derivative of the measured pose by the slow errors.
   BySlow by_slow() const;
-  void carry(const Matrix15d& transition, double dt_s);
+  void carry(const Matrix15d& F, double dt);
   void apply(const Vector15d& d);
   void watch_motion();
 

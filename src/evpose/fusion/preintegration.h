@@ -32,11 +32,10 @@ class Preintegration {
   FusionState predict(const FusionState& start, const Eigen::Vector3d& gravity_map) const;
 
   struct Residual {
-    Vector15d value;             ///< zero where end == predict(start)
-    Matrix15d by_start, by_end;  ///< derivatives by the error states
+    Vector15d value;             ///< zero where j == predict(i)
+    Matrix15d by_start, by_end;  ///< derivatives by the error states of i and j
   };
-  Residual residual(const FusionState& start, const FusionState& end,
-                    const Eigen::Vector3d& gravity_map) const;
+  Residual residual(const FusionState& i, const FusionState& j, const Eigen::Vector3d& gravity_map) const;
 
  private:
   Eigen::Vector3d gyro_bias_, accel_bias_;

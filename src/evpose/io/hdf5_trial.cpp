@@ -32,6 +32,7 @@ void limit(Resource resource, rlim_t most) {
   ::setrlimit(resource, &now);
 }
 
+/// Of this process, bytes; 0: unknown.
 rlim_t address_space() {
   long pages = 0;
   if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
@@ -48,7 +49,7 @@ bool survived(const std::function<void()>& what) {
     for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) std::signal(signal, SIG_DFL);
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_CPU, 10);
-    limit(RLIMIT_AS, address_space() + (rlim_t{1} << 30));
+    if (const rlim_t now = address_space(); now > 0) limit(RLIMIT_AS, now + (rlim_t{1} << 30));
     what();
     ::_exit(0);
   }

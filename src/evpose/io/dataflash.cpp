@@ -151,7 +151,7 @@ bool DataFlashReader::next(DataFlashRecord& record) {
 
 void DataFlashReader::learn(const DataFlashRecord& record) {
   const DataFlashType& type = *record.type;
-  if (type.name == "FMT") {
+  if (&type == types_[kFormatType].get()) {
     add_type(record.body);
   } else if (type.name == "FMTU") {
     add_units(record);

@@ -100,6 +100,17 @@ TEST(DataFlash, NumberedSensorsAreStreamsOfTheirOwn) {
   EXPECT_TRUE(says(error_line(read_dataflash_sensors(path, "IMU[2]", sink)), {"log.bin", "IMU[2]"}));
 }
 
+TEST(DataFlash, OnlyTheFormatTypeDescribesWhateverOthersAreCalled) {
+  const TemporaryFolder folder;
+  const std::string posing = std::string("\x0D\x05", 2) + padded("IMU", 4) + "BB";  // type 13, two bytes
+  const auto imu =
+      imu_of(folder.file("log.bin", format_record(20, 8, "FMT", "Q", "TimeUS") + record(20, posing) +
+                                        format_record(13, 32, "IMU", "Qffffff", kImuLabels) +
+                                        record(13, imu_body(5, 1.f, -9.f))));
+  ASSERT_EQ(imu.size(), 1u);
+  EXPECT_EQ(imu[0].accel.z(), -9);
+}
+
 TEST(DataFlash, BytesThatAreNoRecordArePassedOver) {
   const TemporaryFolder folder;
   const std::string head = format_record(13, 32, "IMU", "Qffffff", kImuLabels);

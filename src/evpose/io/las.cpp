@@ -66,7 +66,8 @@ Expected<PointTable> read_las(const std::string& path) {
   for (auto& column : table.columns) column.reserve(points);
   if (::fseeko(stream, static_cast<off_t>(data), SEEK_SET) != 0)
     return Error{path, "cannot be read", "check the disk"};
-  std::vector<char> rows(kRowsAtOnce * row_bytes);
+  std::vector<char> rows(std::min<std::uint64_t>(kRowsAtOnce, points) *
+                         row_bytes);  // no more than the file has
   for (std::uint64_t done = 0; done < points;) {
     const std::size_t now = static_cast<std::size_t>(std::min<std::uint64_t>(kRowsAtOnce, points - done));
     if (std::fread(rows.data(), row_bytes, now, stream) != now)

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstring>
 #include <limits>
 #include <type_traits>
 #include <utility>
@@ -158,10 +159,12 @@ double chunk_bytes(hid_t properties, std::size_t item) {
   return bytes;
 }
 
-/// Bytes that the file has by its own word, if it is of the usual form; 0 otherwise.
+/// Bytes that the file has by its own word, if it is of the usual form, nothing before its superblock; 0
+/// otherwise.
 std::uint64_t claimed_bytes(std::FILE* file) {
   std::array<unsigned char, 48> head{};
   if (std::fread(head.data(), 1, head.size(), file) != head.size()) return 0;
+  if (std::memcmp(head.data(), "\x89HDF", 4) != 0) return 0;
   const int version = head[8];
   const bool known = version == 0 || version == 2 || version == 3;
   if (!known || head[version == 0 ? 13 : 9] != 8) return 0;  // bytes of an address

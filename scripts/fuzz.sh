@@ -39,9 +39,9 @@ for target in "${targets[@]}"; do
   longest=$((${longest:-0} > 1024 ? longest : 1024))
   options=$common limits=(-rss_limit_mb=2048)
   if [[ $target =~ ^hdf5_(events|map)$ ]]; then
-    # The HDF5 library believes sizes, asks for that much and then finds the file too short; it reads over the end of
-    # damaged attributes. It is not ours to mend: such requests fail, and only what would crash outside of here counts.
-    options=$common:allocator_may_return_null=1:max_allocation_size_mb=1024:replace_intrin=0
+    # The HDF5 library believes sizes, asks for that much and then finds the file too short. It is not ours to mend:
+    # such requests fail.
+    options=$common:allocator_may_return_null=1:max_allocation_size_mb=1024
     limits=(-rss_limit_mb=4096 -malloc_limit_mb=0)
   fi
   run=(env EVPOSE_FUZZ_TARGET="$target" "$program" -max_len="$longest" "${limits[@]}" -timeout=20 -reload=0 -entropic=0

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// PLY, PCD and LZF.
+// PLY, PCD, LAS and LZF.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +7,8 @@
 #include <cstring>
 #include <vector>
 
+#include "evpose/io/child_process.h"
+#include "evpose/io/las.h"
 #include "evpose/io/lzf.h"
 #include "evpose/io/pcd.h"
 #include "evpose/io/ply.h"
@@ -113,6 +115,26 @@ TEST(Ply, ErrorsNameWhatAndWhere) {
       "element face 1\nproperty list uchar int vertex_index\nend_header\n1 2 3\n3 0 0 1\n";
   EXPECT_TRUE(says(error_line(read_ply_mesh(folder.file("a.ply", face), Eigen::Vector3d::Zero())),
                    {"face 0 ", "vertex 1 of 1"}));
+}
+
+TEST(Las, APointOfManyBytesTakesNoMoreMemoryThanTheFileHas) {
+  const TemporaryFolder folder;
+  constexpr std::uint16_t kRowBytes = 65000;
+  std::string file(227, '\0');
+  const auto put = [&](std::size_t at, const std::string& bytes) { file.replace(at, bytes.size(), bytes); };
+  put(0, "LASF");
+  put(24, std::string("\1\2"));
+  put(96, bytes_of<std::uint32_t>(227));
+  put(105, bytes_of(kRowBytes));
+  put(107, bytes_of<std::uint32_t>(1));
+  for (std::size_t k = 0; k < 3; ++k) put(131 + 8 * k, bytes_of(0.5));
+  file += bytes_of<std::int32_t>(2) + bytes_of<std::int32_t>(-4) + bytes_of<std::int32_t>(6);
+  file.resize(227 + kRowBytes);
+  const auto is_read = [](const std::string& path) {
+    const auto table = read_las(path);
+    return table.ok() && table->find("y") != nullptr && *table->find("y") == std::vector<double>{-2};
+  };
+  EXPECT_TRUE(child_survives(is_read, folder.file("a.las", file)));  // which has a gigabyte
 }
 
 TEST(Ply, WrittenPointsAndMeshesReadBack) {

@@ -2,8 +2,12 @@
 // Files, lines, numbers and settings.
 #include <gtest/gtest.h>
 
+#include <csignal>
+#include <vector>
+
 #include "evpose/core/config.h"
 #include "evpose/io/atomic_file.h"
+#include "evpose/io/child_process.h"
 #include "evpose/io/config_yaml.h"
 #include "evpose/io/crc32.h"
 #include "evpose/io/input_file.h"
@@ -202,6 +206,26 @@ TEST(YamlDocument, AnyBytesAreAnsweredInOneLine) {
     const std::string path = folder.file("a.yaml", content);
     expect_no_harm(YamlDocument::read(path), path, static_cast<std::size_t>(i));
   }
+}
+
+TEST(ChildProcess, TellsWhatItLivedThrough) {
+  const std::string sound = "a.h5";
+  EXPECT_TRUE(child_survives([](const std::string& path) { return path == "a.h5"; }, sound));
+  EXPECT_FALSE(child_survives([](const std::string& path) { return path != "a.h5"; }, sound));
+  EXPECT_FALSE(child_survives(
+      [](const std::string&) -> bool {
+        ::raise(SIGSEGV);
+        return true;
+      },
+      sound));
+  EXPECT_FALSE(child_survives(
+      [](const std::string&) -> bool {
+        ::raise(SIGABRT);
+        return true;
+      },
+      sound));
+  EXPECT_FALSE(child_survives(
+      [](const std::string&) { return std::vector<char>(std::size_t{3} << 30, 'x').back() == 'x'; }, sound));
 }
 
 }  // namespace

@@ -343,6 +343,61 @@ TEST(DsecH5, AFileThatBreaksTheLibraryDownIsRefused) {
   EXPECT_TRUE(says(file.error().line(), {"b.h5", "damaged", "copy it again"}));
 }
 
+TEST(Hdf5, AFileWhoseContentCannotBeListedIsRefused) {
+  const TemporaryFolder folder;
+  ForeignFile written(folder / "a.h5");
+  written.put("/a/x", H5T_NATIVE_DOUBLE, std::vector<double>{1, 2});
+  written.put("/b/x", H5T_NATIVE_DOUBLE, std::vector<double>{3});
+  written.close();
+  ASSERT_TRUE(Hdf5File::open(folder / "a.h5").value().dataset("/b/x").ok());
+  // The node with the links of a group: what is in the others could still be asked for by name, untried.
+  std::string bytes = content_of(folder / "a.h5");
+  const auto at = bytes.rfind("SNOD");
+  ASSERT_NE(at, std::string::npos);
+  bytes[at] = 'X';
+  const auto file = Hdf5File::open(folder.file("b.h5", bytes));
+  ASSERT_FALSE(file.ok());
+  EXPECT_TRUE(says(file.error().line(), {"b.h5", "damaged", "copy it again"}));
+}
+
+TEST(Hdf5, AttributesWithBitsWhereNoNumberHasThemAreNone) {
+  const TemporaryFolder folder;
+  const hid_t file = H5Fcreate((folder / "a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t space = H5Screate(H5S_SCALAR);
+  struct Float {
+    std::size_t bytes, exponent_bits, mantissa_bits;  // mantissa, exponent and sign from bit 0 on
+    bool sound;
+  };
+  for (const auto& [bytes, exponent, mantissa, sound] : {Float{2, 5, 10, true},
+                                                         {4, 8, 23, true},
+                                                         {8, 11, 52, true},
+                                                         {16, 15, 112, true},
+                                                         {16, 70, 50, false},
+                                                         {32, 15, 112, false}}) {
+    const hid_t type = H5Tcopy(H5T_IEEE_F64LE);
+    const std::size_t bits = mantissa + exponent + 1;
+    ASSERT_GE(H5Tset_size(type, 32), 0);
+    ASSERT_GE(H5Tset_precision(type, 256), 0);
+    ASSERT_GE(H5Tset_fields(type, bits - 1, mantissa, exponent, 0, mantissa), 0);
+    ASSERT_GE(H5Tset_precision(type, bits), 0);
+    ASSERT_GE(H5Tset_size(type, bytes), 0);
+    H5Tset_ebias(type, (std::size_t{1} << (std::min<std::size_t>(exponent, 60) - 1)) - 1);
+    EXPECT_EQ(is_sound_number(type), sound) << bytes << " bytes";
+    const std::string name = text("f", bytes, '_', exponent);
+    const hid_t attribute = H5Acreate2(file, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+    ASSERT_GE(attribute, 0);
+    const std::string zeros(bytes, '\0');
+    ASSERT_GE(H5Awrite(attribute, type, zeros.data()), 0);
+    H5Aclose(attribute), H5Tclose(type);
+  }
+  H5Sclose(space), H5Fclose(file);
+  const auto opened = Hdf5File::open(folder / "a.h5");
+  ASSERT_TRUE(opened.ok());
+  for (const char* name : {"f2_5", "f4_8", "f8_11", "f16_15"})
+    EXPECT_EQ(opened->attribute_numbers("/", name), std::vector<double>{0}) << name;
+  for (const char* name : {"f16_70", "f32_15"}) EXPECT_FALSE(opened->attribute_numbers("/", name)) << name;
+}
+
 TEST(MvsecH5, EventsAndImuOfACamera) {
   const TemporaryFolder folder;
   const std::string path = folder / "a.hdf5";

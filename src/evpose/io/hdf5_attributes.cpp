@@ -141,7 +141,8 @@ std::optional<std::vector<double>> Hdf5File::attribute_numbers(const std::string
   const auto type = own(H5Aget_type(attribute.get()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.get());
   const hssize_t items = attribute ? items_of(attribute) : -1;
-  if (items < 0 || (kind != H5T_INTEGER && kind != H5T_FLOAT)) return std::nullopt;
+  if (items < 0 || (kind != H5T_INTEGER && kind != H5T_FLOAT) || !is_sound_number(type.get()))
+    return std::nullopt;
   std::vector<double> out(static_cast<std::size_t>(items));
   if (items > 0 && H5Aread(attribute.get(), H5T_NATIVE_DOUBLE, out.data()) < 0) return std::nullopt;
   return out;

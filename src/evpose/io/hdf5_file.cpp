@@ -7,7 +7,9 @@
 #include <array>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <limits>
+#include <system_error>
 #include <type_traits>
 #include <utility>
 
@@ -52,20 +54,6 @@ hid_t memory_type(NumberType type) {
       return H5T_NATIVE_DOUBLE;
   }
   return H5I_INVALID_HID;
-}
-
-/// The library takes the word of a file for where the bits of a number are.
-bool is_sound_number(hid_t type) {
-  const std::size_t bits = 8 * H5Tget_size(type);
-  const auto within = [bits](std::size_t from, std::size_t count) {
-    return from <= bits && count <= bits - from;
-  };
-  const int offset = H5Tget_offset(type);
-  if (offset < 0 || !within(static_cast<std::size_t>(offset), H5Tget_precision(type))) return false;
-  if (H5Tget_class(type) != H5T_FLOAT) return true;
-  std::size_t sign = 0, exponent = 0, exponent_bits = 0, mantissa = 0, mantissa_bits = 0;
-  return H5Tget_fields(type, &sign, &exponent, &exponent_bits, &mantissa, &mantissa_bits) >= 0 &&
-         within(sign, 1) && within(exponent, exponent_bits) && within(mantissa, mantissa_bits);
 }
 
 /// The type whose values are those of a stored one; half and long floats are read as double.
@@ -191,10 +179,33 @@ bool Hdf5Handle::reset() {
   return id < 0 || close_(id) >= 0;
 }
 
+bool is_sound_number(std::int64_t type) {
+  constexpr std::size_t kLargest = 16, kMostExponentBits = 32;  // of a number of four words: bytes; 15 in use
+  const std::size_t size = H5Tget_size(type), bits = 8 * size;
+  if (size > kLargest) return false;
+  const auto within = [bits](std::size_t from, std::size_t count) {
+    return from <= bits && count <= bits - from;
+  };
+  const int offset = H5Tget_offset(type);
+  if (offset < 0 || !within(static_cast<std::size_t>(offset), H5Tget_precision(type))) return false;
+  if (H5Tget_class(type) != H5T_FLOAT) return true;
+  std::size_t sign = 0, exponent = 0, exponent_bits = 0, mantissa = 0, mantissa_bits = 0;
+  return H5Tget_fields(type, &sign, &exponent, &exponent_bits, &mantissa, &mantissa_bits) >= 0 &&
+         within(sign, 1) && exponent_bits <= kMostExponentBits && within(exponent, exponent_bits) &&
+         within(mantissa, mantissa_bits);
+}
+
 std::size_t size_of(NumberType type) { return H5Tget_size(memory_type(type)); }
 
-Hdf5Handle Hdf5File::opened(const std::string& path) {
-  return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+Hdf5File Hdf5File::opened(const std::string& path) {
+  Hdf5File file;
+  file.path_ = path;
+  std::error_code failed;
+  const auto bytes = std::filesystem::file_size(path, failed);
+  if (failed) return file;
+  file.size_ = static_cast<std::int64_t>(bytes);
+  file.id_ = own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  return file;
 }
 
 Expected<Hdf5File> Hdf5File::open(const std::string& path) {
@@ -206,15 +217,9 @@ Expected<Hdf5File> Hdf5File::open(const std::string& path) {
     return Error{path, text("is not an HDF5 file (", plain->size, " bytes)"),
                  "copy it again, or name another format"};
   Hdf5File file;
-  file.path_ = path;
-  file.size_ = plain->size;
   // A file that was cut, which is most of the damaged ones, costs no child.
   const bool cut = claimed_bytes(plain->stream.get()) > static_cast<std::uint64_t>(plain->size);
-  const auto tried = [&file, &path] {
-    file.id_ = opened(path);
-    if (file.id_) file.read_through();
-  };
-  if (!cut && survives(path, tried)) file.id_ = opened(path);
+  if (!cut && survives(path, read_through)) file = opened(path);
   if (!file.id_)
     return Error{path, text("truncated or damaged HDF5 file (", plain->size, " bytes)"), "copy it again"};
   return file;

@@ -37,6 +37,10 @@ class Hdf5Handle {
 enum class NumberType { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
 std::size_t size_of(NumberType type);
 
+/// Whether the bits of a stored integer or floating-point type lie within it, and are as many as numbers
+/// have. The library takes the word of a file for them, and would read and write beyond.
+bool is_sound_number(std::int64_t type);
+
 using Hdf5Shape = std::vector<std::uint64_t>;
 
 /// A member of the rows of a table, and where it goes in the row in memory.
@@ -119,10 +123,11 @@ class Hdf5File {
   Status close();
 
  private:
-  static Hdf5Handle opened(const std::string& path);
+  /// Untried; without identifier if that fails.
+  static Hdf5File opened(const std::string& path);
   /// All that the library is ever asked of a file, for nothing: every object, its attributes, the outermost
-  /// rows of datasets.
-  void read_through() const;
+  /// rows of datasets. False if they cannot be listed.
+  static bool read_through(const std::string& path);
   Error failed(const std::string& what) const;
   Status open_dataset(const std::string& name, int dimensions, Hdf5Dataset& out) const;
 

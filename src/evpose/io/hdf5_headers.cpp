@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/hdf5_headers.h"
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace evpose {
+namespace {
+
+using Bytes = std::span<const unsigned char>;
+
+constexpr std::size_t kPrefix = 16, kMessageHead = 8;  // bytes
+constexpr unsigned kContinuation = 0x10, kAttribute = 0x0C;
+constexpr unsigned kSharedMessage = 2, kSharedType = 1, kSharedSpace = 2;  // flags
+constexpr std::uint64_t kLongestBlock = 1 << 26;
+constexpr std::uint64_t kMostElements = 1 << 16;  // a message is shorter
+constexpr std::size_t kMostBlocks = 10'000;
+
+std::uint64_t little(Bytes bytes, std::size_t at, std::size_t count) {
+  std::uint64_t value = 0;
+  for (std::size_t i = count; i-- > 0;) value = value << 8 | bytes[at + i];
+  return value;
+}
+
+std::optional<std::vector<unsigned char>> block(std::FILE* file, std::uint64_t file_bytes,
+                                                std::uint64_t address, std::uint64_t length) {
+  if (length > kLongestBlock || address > file_bytes || length > file_bytes - address) return std::nullopt;
+  std::vector<unsigned char> bytes(static_cast<std::size_t>(length));
+  if (::fseeko(file, static_cast<off_t>(address), SEEK_SET) != 0 ||
+      std::fread(bytes.data(), 1, bytes.size(), file) != bytes.size())
+    return std::nullopt;
+  return bytes;
+}
+
+/// Of a dataspace message, or kMostElements; none if it is damaged.
+std::optional<std::uint64_t> elements(Bytes space) {
+  if (space.size() < 4) return std::nullopt;
+  const unsigned version = space[0], rank = space[1];
+  if (version == 2 && space[3] == 2) return 0;  // of the null kind
+  const std::size_t head = version == 1 ? 8 : 4;
+  if (version < 1 || version > 2 || space.size() < head + 8 * std::size_t{rank}) return std::nullopt;
+  std::uint64_t count = 1;
+  for (std::size_t i = 0; i < rank; ++i)
+    count = std::min(count * std::min(little(space, head + 8 * i, 8), kMostElements), kMostElements);
+  return count;
+}
+
+bool attribute_lies_within(Bytes message) {
+  if (message.size() < 9) return false;
+  const unsigned version = message[0], flags = version == 1 ? 0U : message[1];
+  if (version < 1 || version > 3) return false;
+  std::size_t at = version == 3 ? 9 : 8;
+  const auto part = [&](std::size_t size_at) -> std::optional<Bytes> {
+    const auto size = static_cast<std::size_t>(little(message, size_at, 2));
+    const std::size_t padded = version == 1 ? (size + 7) / 8 * 8 : size;
+    if (padded > message.size() - at) return std::nullopt;
+    return message.subspan(std::exchange(at, at + padded), size);
+  };
+  const auto name = part(2);
+  const auto type = name ? part(4) : std::nullopt;
+  const auto space = type ? part(6) : std::nullopt;
+  if (!space || std::find(name->begin(), name->end(), 0) == name->end()) return false;
+  if ((flags & (kSharedType | kSharedSpace)) != 0) return true;  // sizes are said elsewhere
+  const auto count = elements(*space);
+  return type->size() >= 8 && count && *count * little(*type, 4, 4) <= message.size() - at;
+}
+
+}  // namespace
+
+bool attributes_lie_within(std::FILE* file, std::uint64_t bytes, std::uint64_t base, std::uint64_t address) {
+  const auto prefix = block(file, bytes, base + address, kPrefix);
+  if (!prefix) return false;
+  if (std::memcmp(prefix->data(), "OHDR", 4) == 0) return true;
+  if (prefix->front() != 1) return false;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> blocks{
+      {base + address + kPrefix, little(*prefix, 8, 4)}};
+  for (std::size_t i = 0; i < blocks.size() && i < kMostBlocks; ++i) {
+    const auto messages = block(file, bytes, blocks[i].first, blocks[i].second);
+    if (!messages) return false;
+    Bytes rest(*messages);
+    while (rest.size() >= kMessageHead) {
+      const auto kind = little(rest, 0, 2), size = little(rest, 2, 2);
+      const unsigned flags = rest[4];
+      rest = rest.subspan(kMessageHead);
+      if (size > rest.size()) return false;
+      const Bytes message = rest.first(static_cast<std::size_t>(size));
+      rest = rest.subspan(message.size());
+      if (kind == kAttribute && (flags & kSharedMessage) == 0 && !attribute_lies_within(message))
+        return false;
+      if (kind == kContinuation) {
+        if (message.size() < 16) return false;
+        blocks.emplace_back(base + little(message, 0, 8), little(message, 8, 8));
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace evpose

@@ -360,6 +360,46 @@ TEST(Hdf5, AFileWhoseContentCannotBeListedIsRefused) {
   EXPECT_TRUE(says(file.error().line(), {"b.h5", "damaged", "copy it again"}));
 }
 
+TEST(Hdf5, AttributesBeyondTheirMessagesAreDamage) {
+  const TemporaryFolder folder;
+  for (const hsize_t before : {0, 512}) {  // bytes of somebody else
+    const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
+    H5Pset_userblock(creation, before);
+    const hid_t file = H5Fcreate((folder / "a.h5").c_str(), H5F_ACC_TRUNC, creation, H5P_DEFAULT);
+    // So many that the header is continued elsewhere.
+    for (const char* name : {"first", "second", "third", "fourth"}) {
+      const hsize_t shape[] = {2, 3};
+      const hid_t space = H5Screate_simple(2, shape, nullptr);
+      const hid_t attribute = H5Acreate2(file, name, H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT);
+      const std::vector<std::int32_t> values{1, 2, 3, 4, 5, 6};
+      ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT32, values.data()), 0);
+      H5Aclose(attribute), H5Sclose(space);
+    }
+    H5Pclose(creation), H5Fclose(file);
+    const auto sound = Hdf5File::open(folder / "a.h5");
+    ASSERT_TRUE(sound.ok()) << before;
+    EXPECT_EQ(sound->attribute_numbers("/", "fourth"), (std::vector<double>{1, 2, 3, 4, 5, 6}));
+
+    const std::string bytes = content_of(folder / "a.h5");
+    for (const char* name : {"first", "fourth"}) {
+      const auto at = bytes.find(name);  // after version, reserved, lengths of name, type and shape
+      ASSERT_NE(at, std::string::npos);
+      const auto refused = [&](std::size_t where, char value) {
+        std::string changed = bytes;
+        changed[where] = value;
+        const auto opened = Hdf5File::open(folder.file("b.h5", changed));
+        return !opened.ok() && says(opened.error().line(), {"b.h5", "damaged"});
+      };
+      EXPECT_TRUE(refused(at - 5, 0x70)) << "a name of 28,000 bytes: " << name;
+      EXPECT_TRUE(refused(at - 3, 0x70)) << "a type: " << name;
+      EXPECT_TRUE(refused(at - 1, 0x70)) << "a shape: " << name;
+      constexpr std::size_t kName = 8, kType = 16;  // as stored
+      EXPECT_TRUE(refused(at + kName + 4, 0x70)) << "elements of 112 bytes: " << name;
+      EXPECT_TRUE(refused(at + kName + kType + 8, 0x70)) << "112 times 3 elements: " << name;
+    }
+  }
+}
+
 TEST(Hdf5, AttributesWithBitsWhereNoNumberHasThemAreNone) {
   const TemporaryFolder folder;
   const hid_t file = H5Fcreate((folder / "a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);

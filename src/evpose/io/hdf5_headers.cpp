@@ -15,7 +15,7 @@ namespace {
 using Bytes = std::span<const unsigned char>;
 
 constexpr std::size_t kPrefix = 16, kMessageHead = 8;  // bytes
-constexpr unsigned kContinuation = 0x10, kAttribute = 0x0C;
+constexpr unsigned kContinuation = 0x10, kAttribute = 0x0C, kFilters = 0x0B;
 constexpr unsigned kSharedMessage = 2, kSharedType = 1, kSharedSpace = 2;  // flags
 constexpr std::uint64_t kLongestBlock = 1 << 26;
 constexpr std::uint64_t kMostElements = 1 << 16;  // a message is shorter
@@ -50,6 +50,8 @@ std::optional<std::uint64_t> elements(Bytes space) {
   return count;
 }
 
+bool has_end(Bytes name) { return std::find(name.begin(), name.end(), 0) != name.end(); }
+
 bool attribute_lies_within(Bytes message) {
   if (message.size() < 9) return false;
   const unsigned version = message[0], flags = version == 1 ? 0U : message[1];
@@ -64,15 +66,35 @@ bool attribute_lies_within(Bytes message) {
   const auto name = part(2);
   const auto type = name ? part(4) : std::nullopt;
   const auto space = type ? part(6) : std::nullopt;
-  if (!space || std::find(name->begin(), name->end(), 0) == name->end()) return false;
+  if (!space || !has_end(*name)) return false;
   if ((flags & (kSharedType | kSharedSpace)) != 0) return true;  // sizes are said elsewhere
   const auto count = elements(*space);
   return type->size() >= 8 && count && *count * little(*type, 4, 4) <= message.size() - at;
 }
 
+bool filters_lie_within(Bytes message) {
+  if (message.size() < 2) return false;
+  const unsigned version = message[0], count = message[1];
+  std::size_t at = version == 1 ? 8 : 2;
+  for (unsigned i = 0; i < count; ++i) {
+    constexpr std::uint64_t kFirstWithName = 256;
+    if (message.size() < at + 2) return false;
+    const bool named = version == 1 || little(message, at, 2) >= kFirstWithName;
+    const std::size_t head = named ? 8 : 6;
+    if (message.size() < at + head) return false;
+    const auto name = named ? static_cast<std::size_t>(little(message, at + 2, 2)) : 0;
+    const auto values = static_cast<std::size_t>(little(message, at + head - 2, 2));
+    const std::size_t bytes = name + 4 * (version == 1 ? (values + 1) / 2 * 2 : values);
+    at += head;
+    if (bytes > message.size() - at || (name > 0 && !has_end(message.subspan(at, name)))) return false;
+    at += bytes;
+  }
+  return true;
+}
+
 }  // namespace
 
-bool attributes_lie_within(std::FILE* file, std::uint64_t bytes, std::uint64_t base, std::uint64_t address) {
+bool messages_are_sound(std::FILE* file, std::uint64_t bytes, std::uint64_t base, std::uint64_t address) {
   const auto prefix = block(file, bytes, base + address, kPrefix);
   if (!prefix) return false;
   if (std::memcmp(prefix->data(), "OHDR", 4) == 0) return true;
@@ -90,8 +112,9 @@ bool attributes_lie_within(std::FILE* file, std::uint64_t bytes, std::uint64_t b
       if (size > rest.size()) return false;
       const Bytes message = rest.first(static_cast<std::size_t>(size));
       rest = rest.subspan(message.size());
-      if (kind == kAttribute && (flags & kSharedMessage) == 0 && !attribute_lies_within(message))
-        return false;
+      const bool here = (flags & kSharedMessage) == 0;
+      if (here && kind == kAttribute && !attribute_lies_within(message)) return false;
+      if (here && kind == kFilters && !filters_lie_within(message)) return false;
       if (kind == kContinuation) {
         if (message.size() < 16) return false;
         blocks.emplace_back(base + little(message, 0, 8), little(message, 8, 8));

@@ -87,7 +87,7 @@ bool Hdf5File::read_through(const std::string& path) {
   hsize_t before = 0;
   if (!plain || H5Pget_userblock(creation.get(), &before) < 0) return false;
   for (const auto& [name, is_dataset, header] : objects) {
-    if (!attributes_lie_within(plain->stream.get(), static_cast<std::uint64_t>(plain->size), before, header))
+    if (!messages_are_sound(plain->stream.get(), static_cast<std::uint64_t>(plain->size), before, header))
       return false;
     file.has_attribute(name, "no such attribute");  // looks at all, even where they cannot be counted
     for (const std::string& attribute : file.attributes(name)) {

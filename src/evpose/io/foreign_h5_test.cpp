@@ -400,6 +400,31 @@ TEST(Hdf5, AttributesBeyondTheirMessagesAreDamage) {
   }
 }
 
+TEST(Hdf5, FiltersBeyondTheirMessagesAreDamage) {
+  const TemporaryFolder folder;
+  const hid_t file = H5Fcreate((folder / "a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+  const hsize_t rows = 100;
+  H5Pset_chunk(properties, 1, &rows), H5Pset_shuffle(properties), H5Pset_deflate(properties, 4);
+  const hid_t space = H5Screate_simple(1, &rows, nullptr);
+  const hid_t set = H5Dcreate2(file, "x", H5T_STD_I16LE, space, H5P_DEFAULT, properties, H5P_DEFAULT);
+  ASSERT_GE(set, 0);
+  H5Dclose(set), H5Sclose(space), H5Pclose(properties), H5Fclose(file);
+  ASSERT_TRUE(Hdf5File::open(folder / "a.h5").value().dataset("/x").ok());
+  const std::string bytes = content_of(folder / "a.h5");
+  for (const char* name : {"shuffle", "deflate"}) {
+    const auto at = bytes.find(name);  // after number, length of the name, flags and number of values
+    ASSERT_NE(at, std::string::npos);
+    for (const std::size_t length : {at - 5, at - 1}) {
+      std::string changed = bytes;
+      changed[length] = 0x70;
+      const auto opened = Hdf5File::open(folder.file("b.h5", changed));
+      ASSERT_FALSE(opened.ok()) << name;
+      EXPECT_TRUE(says(opened.error().line(), {"b.h5", "damaged"}));
+    }
+  }
+}
+
 TEST(Hdf5, AttributesWithBitsWhereNoNumberHasThemAreNone) {
   const TemporaryFolder folder;
   const hid_t file = H5Fcreate((folder / "a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);

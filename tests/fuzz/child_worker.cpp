@@ -18,7 +18,7 @@ constexpr int kFiles = 5000;  // by one child: what the library forgets to give 
 
 /// Of processor time. Small files take 1 to 5 ms, and one in forty sends the library into an endless loop,
 /// which elsewhere ends after ten seconds or a gigabyte.
-constexpr timeval kPatience{0, 25'000};  // s, us
+constexpr timeval kPatience{0, 12'000};  // s, us
 
 class Worker {
  public:

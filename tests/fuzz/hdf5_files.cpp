@@ -13,7 +13,7 @@ namespace {
 
 /// The library asks for half a megabyte at each opening, and four fifths of the time would go into fresh
 /// pages of it: it may keep what it frees.
-const herr_t kept = H5set_free_list_limits(64 << 20, 8 << 20, 1 << 20, 64 << 10, 1 << 20, 64 << 10);
+const herr_t kept = H5set_free_list_limits(64 << 20, 8 << 20, 64 << 20, 8 << 20, 64 << 20, 8 << 20);
 
 }  // namespace
 

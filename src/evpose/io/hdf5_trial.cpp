@@ -94,19 +94,19 @@ bool Hdf5File::read_through(const std::string& path) {
       file.attribute_numbers(name, attribute);
       file.attribute_strings(name, attribute);
     }
-    Hdf5Dataset dataset;
-    if (!is_dataset || !file.open_dataset(name, -1, dataset)) continue;
-    const hid_t id = dataset.id_.get();
+    if (!is_dataset) continue;
+    auto dataset = file.dataset(name);
+    if (!dataset) dataset = file.table(name, {}, 1);
+    if (!dataset) continue;
+    const hid_t id = dataset->id_.get();
     const Hdf5Handle type{H5Dget_type(id), H5Tclose};
-    const bool rows = H5Tget_class(type.get()) == H5T_COMPOUND;
-    if (rows ? !file.table(name, {}, 1) : !file.dataset(name)) continue;
     const Hdf5Handle native{H5Tget_native_type(type.get(), H5T_DIR_ASCEND), H5Tclose};
     auto bytes = static_cast<double>(std::max(H5Tget_size(native.get()), H5Tget_size(type.get())));
-    for (std::size_t i = 1; i < dataset.shape_.size(); ++i) bytes *= static_cast<double>(dataset.shape_[i]);
-    if (!native || !(bytes <= kLongestRow) || dataset.rows() == 0) continue;
+    for (std::size_t i = 1; i < dataset->shape_.size(); ++i) bytes *= static_cast<double>(dataset->shape_[i]);
+    if (!native || !(bytes <= kLongestRow) || dataset->rows() == 0) continue;
     std::vector<char> row(static_cast<std::size_t>(bytes));
-    read_row(id, native.get(), 0, dataset.shape_, row.data());
-    read_row(id, native.get(), dataset.rows() - 1, dataset.shape_, row.data());
+    read_row(id, native.get(), 0, dataset->shape_, row.data());
+    read_row(id, native.get(), dataset->rows() - 1, dataset->shape_, row.data());
   }
   return true;
 }

@@ -180,7 +180,7 @@ bool Hdf5Handle::reset() {
 }
 
 bool is_sound_number(std::int64_t type) {
-  constexpr std::size_t kLargest = 16, kMostExponentBits = 32;  // of a number of four words: bytes; 15 in use
+  constexpr std::size_t kLargest = 16, kMostExponentBits = 32;  // bytes; quadruple precision has 15
   const std::size_t size = H5Tget_size(type), bits = 8 * size;
   if (size > kLargest) return false;
   const auto within = [bits](std::size_t from, std::size_t count) {

@@ -16,8 +16,8 @@ bool is_child = false;
 
 constexpr int kFiles = 5000;  // by one child: what the library forgets to give back stays bounded
 
-/// Of processor time. Small files take 1 to 5 ms, and one in forty sends the library into an endless loop,
-/// which elsewhere ends after ten seconds or a gigabyte.
+/// Of processor time. Small files take 1 to 5 ms, and up to one in forty sends the library into an endless
+/// loop, which elsewhere ends after ten seconds or a gigabyte.
 constexpr timeval kPatience{0, 12'000};  // s, us
 
 class Worker {

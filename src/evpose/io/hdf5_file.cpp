@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "evpose/io/atomic_file.h"
+#include "evpose/io/byte_stream.h"
 #include "evpose/io/hdf5_filters.h"
 #include "evpose/io/hdf5_trial.h"
 #include "evpose/io/input_file.h"
@@ -150,15 +151,13 @@ double chunk_bytes(hid_t properties, std::size_t item) {
 /// Bytes that the file has by its own word, if it is of the usual form, nothing before its superblock; 0
 /// otherwise.
 std::uint64_t claimed_bytes(std::FILE* file) {
-  std::array<unsigned char, 48> head{};
+  std::array<std::byte, 48> head{};
   if (std::fread(head.data(), 1, head.size(), file) != head.size()) return 0;
   if (std::memcmp(head.data(), "\x89HDF", 4) != 0) return 0;
-  const int version = head[8];
+  const auto version = load<std::uint8_t>(head, 8);
   const bool known = version == 0 || version == 2 || version == 3;
-  if (!known || head[version == 0 ? 13 : 9] != 8) return 0;  // bytes of an address
-  std::uint64_t end = 0;
-  for (std::size_t i = 8; i-- > 0;) end = end << 8 | head[(version == 0 ? 40 : 28) + i];
-  return end;
+  if (!known || load<std::uint8_t>(head, version == 0 ? 13 : 9) != 8) return 0;  // bytes of an address
+  return load<std::uint64_t>(head, version == 0 ? 40 : 28);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ Expected<Setup> read_setup(const Parameters& parameters) {
   const std::pair<const char*, const std::string&> needed[] = {
       {"map", parameters.map}, {"calibration", parameters.calibration}, {"init", parameters.init}};
   for (const auto& [name, value] : needed)
-    if (value.empty()) return Error{std::string("parameter ~") + name, "is not given", "see docs/live.md"};
+    if (value.empty()) return Error{std::string("parameter ~") + name, "is not given", "see docs/use/live.md"};
   const auto calibration = read_calibration(parameters.calibration);
   if (!calibration) return calibration.error();
   const auto chosen = choose_camera(*calibration);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ROS 1 node: topics `events` (dvs_msgs, prophesee_event_msgs, event_camera_msgs) and `imu` in; `odom`, `path`, `map`,
-// tf map -> base_link and /diagnostics out; service `reset`. Parameters: docs/live.md.
+// tf map -> base_link and /diagnostics out; service `reset`. Parameters: docs/use/live.md.
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <nav_msgs/Odometry.h>

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of docs/accuracy.md: every shared recording, tracked with the shipped defaults.
+"""The table of docs/results/accuracy.md: every shared recording, tracked with the shipped defaults.
 
     accuracy.py EVPOSE SHARED OUT.md     about two minutes
 

@@ -5,7 +5,7 @@
 # go side by side, and add up.
 #   scripts/fuzz.sh                     each target 2,000,000 times
 #   scripts/fuzz.sh 100000 ecf          the target ecf 100,000 times
-#   scripts/fuzz.sh --table             what the logs say, as the table of docs/formats.md
+#   scripts/fuzz.sh --table             what the logs say, as the table of docs/results/fuzzing.md
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The figures of docs/live.md: delay, shedding and memory of evpose serve.
+"""The figures of docs/results/live.md: delay, shedding and memory of evpose serve.
 
     live_figures.py EVPOSE SHARED               delay at 1x and under load, a minute
     live_figures.py EVPOSE SHARED --soak 30     memory over so many minutes of a hover in a loop; --speed 0.5: half as fast

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/map-table.md: maps built from the shared clouds, and tracking with them.
+"""docs/results/map.md: maps built from the shared clouds, and tracking with them.
 
     map_accuracy.py EVPOSE SHARED OUT.md     some minutes
 

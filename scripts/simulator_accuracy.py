@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of docs/accuracy-simulator.md: scenarios of `evpose simulate`, tracked with the shipped defaults.
+"""The tables of docs/results/simulator.md: scenarios of `evpose simulate`, tracked with the shipped defaults.
 
     simulator_accuracy.py EVPOSE RECORDINGS OUT.md [--seconds 2] [--only NAME...]
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Variants of the tracker side by side: the back ends (docs/fusion.md), and what each module brings
-// (docs/accuracy.md).
+// Variants of the tracker side by side: the back ends (docs/results/fusion.md), and what each module brings
+// (docs/results/ablation.md).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>

@@ -34,7 +34,8 @@ int run_serve(const ServeRequest& request, bool ros) {
 
 void add_serve(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand(
-      "serve", "Track a live stream, or a recording as if it were one, and hand the pose on (docs/live.md)");
+      "serve",
+      "Track a live stream, or a recording as if it were one, and hand the pose on (docs/use/live.md)");
   auto request = std::make_shared<ServeRequest>();
   auto dump = std::make_shared<bool>(false);
   auto speed = std::make_shared<double>(1);

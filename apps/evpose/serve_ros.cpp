@@ -40,7 +40,7 @@ Error start_ros_node(const ServeRequest& request) {
   const TrackRequest& track = request.track;
   if (!request.mavlink.empty() || request.view >= 0 || !track.output.empty() || !track.config_file.empty())
     return {track.recording, "the ROS node has topics, and neither --mavlink, --view, --output nor --config",
-            "leave them out, or let a driver send packets (docs/live.md)"};
+            "leave them out, or let a driver send packets (docs/use/live.md)"};
   auto words = topics_of(track.recording);
   if (!words) return words.error();
   words->insert(words->begin(), node_path());

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of docs/formats.md from the logs of scripts/fuzz.sh: table.py FOLDER
+"""The table of docs/results/fuzzing.md from the logs of scripts/fuzz.sh: table.py FOLDER
 
 Executions of all logs of a target are added up, also of one that has not ended or has found something.
 """

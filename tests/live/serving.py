@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The live program under test: recordings to serve, ports, packets as a driver sends them (docs/live.md)."""
+"""The live program under test: recordings to serve, ports, packets as a driver sends them (docs/use/live.md)."""
 import pathlib
 import signal
 import socket

@@ -9,7 +9,7 @@
 namespace evpose {
 
 /// One brightness change. Eight bytes, time relative to its packet: the layout that filter and surfaces read
-/// fastest (docs/performance.md, "Layout of events").
+/// fastest (docs/results/performance.md, "Layout of events").
 struct Event {
   std::uint32_t dt_us;   ///< time since the packet's base, microseconds
   std::uint16_t x;       ///< column, 0 at the left

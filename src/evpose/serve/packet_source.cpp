@@ -97,7 +97,7 @@ class PacketSource : public Source {
     const auto& c = decoder_.counts();
     tell(c.missed, told_.missed, "packets of the driver are missing by their numbers");
     tell(c.bad_packets, told_.bad_packets,
-         "pieces that are no packets were skipped (docs/live.md has the format)");
+         "pieces that are no packets were skipped (docs/use/live.md has the format)");
     tell(c.bad_events, told_.bad_events, "events out of order or outside of the image were left out");
     tell(c.bad_samples, told_.bad_samples, "IMU samples that are not finite were left out");
   }

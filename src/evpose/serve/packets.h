@@ -14,8 +14,8 @@
 
 namespace evpose {
 
-/// The packets of a camera's driver (docs/live.md): a header of 24 bytes and a payload. In a datagram stands
-/// one packet, in a stream one follows the other.
+/// The packets of a camera's driver (docs/use/live.md): a header of 24 bytes and a payload. In a datagram
+/// stands one packet, in a stream one follows the other.
 struct PacketHeader {
   static constexpr std::size_t kBytes = 24;
   static constexpr std::uint32_t kMagic = 0x31505645;     ///< "EVP1"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "evpose/event/event.h"
-#include "track_recording.h"
+#include "evpose/run/track_recording.h"
 
 namespace evpose {
 

@@ -7,8 +7,8 @@
 #include "evpose/io/calibration.h"
 #include "evpose/io/numbers.h"
 #include "evpose/io/sensor_streams.h"
+#include "evpose/run/progress.h"
 #include "interrupt.h"
-#include "progress.h"
 
 namespace evpose {
 

@@ -5,9 +5,9 @@
 #include <thread>
 
 #include "commands.h"
+#include "evpose/run/progress.h"
+#include "evpose/run/track_recording.h"
 #include "evpose/sim/recording_maker.h"
-#include "progress.h"
-#include "track_recording.h"
 
 namespace evpose {
 namespace {

@@ -7,8 +7,8 @@
 #include "evpose/io/event_survey.h"
 #include "evpose/io/numbers.h"
 #include "evpose/io/sensor_streams.h"
+#include "evpose/run/progress.h"
 #include "info_parts.h"
-#include "progress.h"
 
 namespace evpose {
 namespace {

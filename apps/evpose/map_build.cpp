@@ -17,8 +17,8 @@
 #include "evpose/io/trajectory_tum.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
+#include "evpose/run/progress.h"
 #include "interrupt.h"
-#include "progress.h"
 
 namespace evpose {
 namespace {

@@ -17,11 +17,11 @@
 #include "evpose/io/kalibr.h"
 #include "evpose/io/map_h5.h"
 #include "evpose/mavlink/link.h"
+#include "evpose/run/start.h"
 #include "evpose/serve/metavision_source.h"
 #include "evpose/serve/packet_source.h"
 #include "evpose/view/viewer.h"
 #include "interrupt.h"
-#include "start.h"
 
 namespace evpose {
 namespace {

@@ -4,10 +4,10 @@
 #include <string>
 
 #include "evpose/mavlink/reporter.h"
+#include "evpose/run/track_recording.h"
 #include "evpose/serve/replay_source.h"
 #include "evpose/serve/session.h"
 #include "evpose/serve/stream_queue.h"
-#include "track_recording.h"
 
 namespace evpose {
 

@@ -10,8 +10,8 @@
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
 #include "evpose/io/config_yaml.h"
+#include "evpose/run/progress.h"
 #include "evpose/sim/recording_maker.h"
-#include "progress.h"
 
 namespace evpose {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "commands.h"
-#include "track_recording.h"
+#include "evpose/run/track_recording.h"
 
 namespace evpose {
 namespace {

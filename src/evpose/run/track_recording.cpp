@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "track_recording.h"
+#include "evpose/run/track_recording.h"
 
 #include <sys/resource.h>
 
@@ -14,9 +14,9 @@
 #include "evpose/io/ply.h"
 #include "evpose/io/recording.h"
 #include "evpose/report/overlay.h"
-#include "packet_queue.h"
-#include "progress.h"
-#include "start.h"
+#include "evpose/run/packet_queue.h"
+#include "evpose/run/progress.h"
+#include "evpose/run/start.h"
 
 namespace evpose {
 namespace {

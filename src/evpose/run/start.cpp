@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "start.h"
+#include "evpose/run/start.h"
 
 #include <algorithm>
 #include <charconv>

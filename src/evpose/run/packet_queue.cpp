@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "packet_queue.h"
+#include "evpose/run/packet_queue.h"
 
 #include <utility>
 

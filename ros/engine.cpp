@@ -72,7 +72,7 @@ Expected<Setup> read_setup(const Parameters& parameters) {
   fusion.start_velocity_sigma_m_s = std::max(fusion.start_velocity_sigma_m_s, 0.5);
   fusion.start_angular_rate_sigma_rad_s = std::max(fusion.start_angular_rate_sigma_rad_s, 0.5);
   ConfigTable table;
-  out.config.capture.on = false;  // a search takes longer than the data it looks at
+  out.config.relocalization.on = false;  // a search takes longer than the data it looks at
   describe(table, out.config);
   for (const std::string& setting : parameters.settings) {
     const auto equals = setting.find('=');

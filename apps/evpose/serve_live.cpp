@@ -300,7 +300,7 @@ void describe(ConfigTable& table, ServeConfig& c) {
 
 Expected<ServeConfig> load_serve_config(const TrackRequest& request) {
   ServeConfig config;
-  config.run.tracker.capture.on = false;  // a search takes longer than the data it looks at
+  config.run.tracker.relocalization.on = false;  // a search takes longer than the data it looks at
   config.run.tracker.threads = 2;
   config.run.tracker.events.most_mev_s = 6;  // with which two slow cores keep up
   ConfigTable table;

@@ -33,7 +33,7 @@ void update(benchmark::State& state) {
   config.field = state.range(3) == 0 ? FieldKind::events : FieldKind::exponential;
   // The random load must not move the pose, nor start a search for it; all stages run all the same.
   config.health.gate = -1;
-  config.capture.on = false;
+  config.relocalization.on = false;
   config.fusion.cv_accel_density = config.fusion.cv_angular_density = 1e-3;
   config.fusion.start_position_sigma_m = config.fusion.start_rotation_sigma_rad = 3e-4;
   config.fusion.start_velocity_sigma_m_s = config.fusion.start_angular_rate_sigma_rad_s = 1e-3;

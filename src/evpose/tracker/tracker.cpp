@@ -77,7 +77,7 @@ void describe(ConfigTable& table, TrackerConfig& c) {
   table.group("fusion", c.fusion);
   table.group("imu", c.imu);
   table.group("agreement", c.agreement);
-  table.group("capture", c.capture);
+  table.group("relocalization", c.relocalization);
   table.group("health", c.health);
 }
 
@@ -113,8 +113,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       visible_(index_, *setup_.camera, spread(config), config.threads > 1),
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
-      capture_(config.capture, index_, pieces_, *setup_.camera, setup_.T_body_cam,
-               fusion_->motion().gravity_map()),
+      relocalizer_(config.relocalization, index_, pieces_, *setup_.camera, setup_.T_body_cam,
+                   fusion_->motion().gravity_map()),
       health_(config.health),
       imu_watch_(config.imu),
       agreement_(config.agreement),
@@ -128,8 +128,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
   before_search_ = fusion_->state();
-  if (config.capture.on && sigma_px() > config.capture.from_px)
-    capture_.begin(start.t, fusion_->state().nav, fusion_->state().pose_covariance());
+  if (config.relocalization.on && sigma_px() > config.relocalization.from_px)
+    relocalizer_.begin_search(start.t, fusion_->state().nav, fusion_->state().pose_covariance());
   next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
   visible_.choose(start.T_map_body * setup_.T_body_cam);  // the dearest one, before the data come
 }
@@ -291,7 +291,7 @@ void Tracker::predict(TimeNs t) {
                                                       : ImuTrust::good;
     agreement_.step(a.sample, b.sample, with_imu_biases(), fusion_->motion().gravity_map(),
                     fusion_->motion().noise_at(b.sample.gyro, b.sample.accel, reading));
-    if (capture_.searching() || verify_until_ != 0)
+    if (relocalizer_.searching() || verify_until_ != 0)
       moved_ = joined(moved_, integrate(a.sample, b.sample, state.gyro_bias, state.accel_bias));
     if (agreement_.distrusted(t))
       fusion_->predict(held_reading(a.sample.t, state), held_reading(b.sample.t, state), ImuTrust::none);
@@ -335,7 +335,8 @@ std::string Tracker::weakest_direction() const {
 
 /// One update's part of the search for the pose; when it is found, tracking begins there.
 void Tracker::search(TimeNs t) {
-  const auto found = capture_.take(t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate);
+  const auto found =
+      relocalizer_.process(t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate);
   if (!found) return;
   FusionState state = fusion_->motion().start(fusion_->state().t, found->nav, found->angular_rate);
   state.gyro_bias = fusion_->state().gyro_bias;
@@ -344,13 +345,13 @@ void Tracker::search(TimeNs t) {
   const auto widen = [&state](int at, double sigma) {
     state.covariance.diagonal().segment<3>(at).setConstant(sigma * sigma);
   };
-  widen(error_state::kP, config_.capture.found_position_sigma_m);
-  widen(error_state::kPhi, config_.capture.found_rotation_sigma_rad);
-  widen(error_state::kV, config_.capture.found_velocity_sigma_m_s);
+  widen(error_state::kP, config_.relocalization.found_position_sigma_m);
+  widen(error_state::kPhi, config_.relocalization.found_rotation_sigma_rad);
+  widen(error_state::kV, config_.relocalization.found_velocity_sigma_m_s);
   fusion_->start(state);
   alignment_.forget();
   agreement_.forget();
-  verify_until_ = t + from_seconds(config_.capture.verify_s);
+  verify_until_ = t + from_seconds(config_.relocalization.verify_s);
 }
 
 double Tracker::plan_points(const Pose& T_map_body, double span_s) {
@@ -435,17 +436,17 @@ Update Tracker::update(TimeNs t) {
   const TimeNs until = past ? fusion_->state().t : imu_time(t);
   const bool blind = bridge_silence(until);
   predict(until);
-  if (capture_.searching())
+  if (relocalizer_.searching())
     search(t);
   else if (verify_until_ != 0)
-    capture_.follow(moved_);
+    relocalizer_.add_motion(moved_);
   const Pose predicted = fusion_->state().nav.T_map_body;
   const double t1 = now();
 
   const double flow_px_s = plan_points(predicted, span_s);
   const double t2 = now();
 
-  const bool searching = capture_.searching();
+  const bool searching = relocalizer_.searching();
   const Registration stpe = searching ? Registration{} : register_events(t, predicted, span_s);
   const double t3 = now();
 
@@ -454,7 +455,7 @@ Update Tracker::update(TimeNs t) {
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
   // A pose that was found is believed once its events have gathered at the contours for a while.
   const bool watched = verify_until_ != 0,
-             refuted = watched && t >= verify_until_ && stpe.slope < config_.capture.low_slope;
+             refuted = watched && t >= verify_until_ && stpe.slope < config_.relocalization.low_concentration;
   evidence.searching = searching || t < verify_until_ || refuted;
   evidence.refused = searching || refuted ? "searching for the pose"
                      : past               ? "the time offset has changed"
@@ -488,14 +489,15 @@ Update Tracker::update(TimeNs t) {
     state.gyro_bias = before_search_.gyro_bias;
     state.accel_bias = before_search_.accel_bias;
     fusion_->start(state);
-    capture_.resume(t);
+    relocalizer_.restart_search(t);
   }
-  if (config_.capture.on && !capture_.searching() && astray_s_ > config_.capture.patience_s) {
+  if (config_.relocalization.on && !relocalizer_.searching() &&
+      astray_s_ > config_.relocalization.patience_s) {
     Matrix6d around = covariance;
-    around.diagonal().head<3>().array() += std::pow(config_.capture.position_sigma_m, 2);
-    around.diagonal().tail<3>().array() += std::pow(config_.capture.rotation_sigma_rad, 2);
+    around.diagonal().head<3>().array() += std::pow(config_.relocalization.position_sigma_m, 2);
+    around.diagonal().tail<3>().array() += std::pow(config_.relocalization.rotation_sigma_rad, 2);
     before_search_ = fusion_->state();
-    capture_.begin(t, fusion_->state().nav, around);
+    relocalizer_.begin_search(t, fusion_->state().nav, around);
     astray_s_ = 0;
   }
 

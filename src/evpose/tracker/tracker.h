@@ -16,11 +16,11 @@
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/event_alignment.h"
 #include "evpose/registration/registration.h"
-#include "evpose/tracker/capture.h"
 #include "evpose/tracker/contour_view.h"
 #include "evpose/tracker/health.h"
 #include "evpose/tracker/imu_agreement.h"
 #include "evpose/tracker/imu_watch.h"
+#include "evpose/tracker/relocalizer.h"
 #include "evpose/tracker/update.h"
 
 namespace evpose {
@@ -36,7 +36,7 @@ struct TrackerConfig {
   FusionConfig fusion;
   ImuWatchConfig imu;
   ImuAgreementConfig agreement;
-  CaptureConfig capture;
+  RelocalizationConfig relocalization;
   HealthConfig health;
 };
 void describe(ConfigTable& table, TrackerConfig& config);
@@ -151,7 +151,7 @@ class Tracker {
   VisibleSet visible_;
   EventFront front_;
   std::unique_ptr<BackEnd> fusion_;
-  Capture capture_;
+  Relocalizer relocalizer_;
   HealthMonitor health_;
   std::function<void(const Update&)> callback_;
   std::function<void(const FusionState&)> state_callback_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/tracker/capture.h"
+#include "evpose/tracker/relocalizer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +31,7 @@ constexpr double kSame_m = 0.02, kSame_rad = 0.007;  // candidates nearer than t
 
 }  // namespace
 
-void describe(ConfigTable& table, CaptureConfig& c) {
+void describe(ConfigTable& table, RelocalizationConfig& c) {
   table.add("on", c.on, "search the pose when it starts or becomes unsure");
   table.add("from_px", c.from_px, "px", "start poses less sure than this are searched", {0, 1e4});
   table.add("slice_events_per_column", c.slice_events_per_column, "",
@@ -42,10 +42,10 @@ void describe(ConfigTable& table, CaptureConfig& c) {
   table.add("least_slices", c.least_slices, "", "looked at before a pose is believed", {1, 100});
   table.add("most_slices", c.most_slices, "", "... and at most", {1, 1000});
   table.add("sharpened", c.sharpened, "", "poses whose events are looked at one by one", {1, 1000});
-  table.add("least_slope", c.least_slope, "", "how much the events of a pose that is believed gather",
-            {0, 1});
+  table.add("least_concentration", c.least_concentration, "",
+            "how much the events of a pose that is believed gather", {0, 1});
   table.add("least_lead", c.least_lead, "", "... and so many times more than those of the next", {1, 100});
-  table.add("low_slope", c.low_slope, "", "... or so much, if they are", {0, 1});
+  table.add("low_concentration", c.low_concentration, "", "... or so much, if they are", {0, 1});
   table.add("clear_lead", c.clear_lead, "", "... so many times more than those of the next", {1, 100});
   table.add("velocity_sigma_m_s", c.velocity_sigma_m_s, "m/s", "when a search begins", {0.01, 100});
   table.add("position_sigma_m", c.position_sigma_m, "m", "around the last pose when it was lost", {1e-3, 10});
@@ -61,8 +61,9 @@ void describe(ConfigTable& table, CaptureConfig& c) {
   table.group("search", c.search);
 }
 
-Capture::Capture(const CaptureConfig& config, const ContourIndex& index, const ContourPieces& pieces,
-                 const Camera& camera, const Pose& T_body_cam, const Eigen::Vector3d& gravity_map)
+Relocalizer::Relocalizer(const RelocalizationConfig& config, const ContourIndex& index,
+                         const ContourPieces& pieces, const Camera& camera, const Pose& T_body_cam,
+                         const Eigen::Vector3d& gravity_map)
     : config_(config),
       index_(index),
       pieces_(pieces),
@@ -72,7 +73,7 @@ Capture::Capture(const CaptureConfig& config, const ContourIndex& index, const C
       has_imu_(!gravity_map.isZero()),
       search_(config.search) {}
 
-void Capture::begin(TimeNs t, const NavState& state, const Matrix6d& covariance) {
+void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance) {
   if (!field_) {
     field_ = std::make_unique<EdgeField>(camera_.size());
     field_->set_spreads(static_cast<float>(config_.search.coarse_px),
@@ -98,9 +99,9 @@ void Capture::begin(TimeNs t, const NavState& state, const Matrix6d& covariance)
   searching_ = true;
   prior_ = state;
   prior_covariance_ = covariance;
-  candidates_.clear();
+  hypotheses_.clear();
   slice_.clear();
-  parts_.clear();
+  intervals_.clear();
   slice_begin_ = t;
   last_slice_ = 0;
   since_ = {};
@@ -109,36 +110,37 @@ void Capture::begin(TimeNs t, const NavState& state, const Matrix6d& covariance)
   searches_ = 0;
 }
 
-void Capture::resume(TimeNs t) {
+void Relocalizer::restart_search(TimeNs t) {
   searching_ = true;
   slice_begin_ = t;
-  candidates_.clear();
+  hypotheses_.clear();
   slice_.clear();
-  parts_.clear();
+  intervals_.clear();
   slices_ = 0;
   ++searches_;
 }
 
-void Capture::remember(std::uint32_t now_us, std::span<const FrontEvent> events, const ImuIncrement& motion) {
-  if (parts_.empty() || parts_.back().motion.dt_s >= kPart_s) {
-    if (parts_.size() == kParts) {
-      parts_.push_back(std::move(parts_.front()));
-      parts_.pop_front();
-      parts_.back().events.clear();
-      parts_.back().motion = {};
+void Relocalizer::append_interval(std::uint32_t now_us, std::span<const FrontEvent> events,
+                                  const ImuIncrement& motion) {
+  if (intervals_.empty() || intervals_.back().motion.dt_s >= kPart_s) {
+    if (intervals_.size() == kParts) {
+      intervals_.push_back(std::move(intervals_.front()));
+      intervals_.pop_front();
+      intervals_.back().events.clear();
+      intervals_.back().motion = {};
     } else {
-      parts_.emplace_back();
+      intervals_.emplace_back();
     }
   }
-  Part& part = parts_.back();
-  part.events.insert(part.events.end(), events.begin(), events.end());
-  part.now_us = now_us;
-  part.motion = joined(part.motion, motion);
-  part.rate = rate_;
+  Interval& interval = intervals_.back();
+  interval.events.insert(interval.events.end(), events.begin(), events.end());
+  interval.now_us = now_us;
+  interval.motion = joined(interval.motion, motion);
+  interval.rate = rate_;
 }
 
 /// The state at the begin of `motion` from that at its end.
-NavState Capture::before(const Candidate& c, const NavState& nav, const ImuIncrement& m) const {
+NavState Relocalizer::propagate_back(const Hypothesis& c, const NavState& nav, const ImuIncrement& m) const {
   const double dt = m.dt_s;
   NavState out;
   out.T_map_body.q = (nav.T_map_body.q * (has_imu_ ? m.dq.conjugate() : so3::exp(-dt * c.rate))).normalized();
@@ -148,7 +150,7 @@ NavState Capture::before(const Candidate& c, const NavState& nav, const ImuIncre
   return out;
 }
 
-void Capture::move(Candidate& c, const ImuIncrement& m) const {
+void Relocalizer::propagate(Hypothesis& c, const ImuIncrement& m) const {
   const double dt = m.dt_s;
   NavState& nav = c.nav;
   nav.T_map_body.p += nav.velocity * dt + 0.5 * dt * dt * gravity_map_ + nav.T_map_body.q * m.dp;
@@ -161,7 +163,7 @@ void Capture::move(Candidate& c, const ImuIncrement& m) const {
   c.rotation_variance += slices_ == 1 ? 1.0 * dt * dt : 0.1 * dt * dt;
 }
 
-void Capture::look(const Pose& T_map_body) {
+void Relocalizer::select_search_points(const Pose& T_map_body) {
   points_.clear();
   const ContourMap& map = index_.map();
   for (const std::uint32_t i : visible_->choose(T_map_body * T_body_cam_))
@@ -169,8 +171,8 @@ void Capture::look(const Pose& T_map_body) {
 }
 
 /// Moves the slice's events to where they would be had the body not turned from one instant, age_s ago.
-void Capture::turn_back(double age_s, std::uint32_t now_us) {
-  turned_ = slice_;
+void Relocalizer::compensate_rotation(double age_s, std::uint32_t now_us) {
+  compensated_ = slice_;
   if (!has_imu_) return;
   const Eigen::Vector3d rate_cam = T_body_cam_.q.conjugate() * rate_;
   const ImageSize size = camera_.size();
@@ -192,23 +194,24 @@ void Capture::turn_back(double age_s, std::uint32_t now_us) {
     if (!(x >= 0 && y >= 0 && x < size.width && y < size.height)) continue;
     e.x = static_cast<std::uint16_t>(x);
     e.y = static_cast<std::uint16_t>(y) & 0x7FFF;
-    turned_[kept++] = e;
+    compensated_[kept++] = e;
   }
-  turned_.resize(kept);
+  compensated_.resize(kept);
 }
 
 /// Before a search: the first follow at once, later ones ever more slowly, since each costs a second of
 /// processor time.
-double Capture::pause_s() const {
+double Relocalizer::pause_s() const {
   return searches_ <= kSameWidth ? config_.gap_s : std::min(kLongestPause_s, 0.1 * (searches_ - kSameWidth));
 }
 
-std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
-                                            std::span<const FrontEvent> events, const ImuIncrement& motion,
-                                            const Eigen::Vector3d& angular_rate) {
+std::optional<Relocalizer::Found> Relocalizer::process(TimeNs t, std::uint32_t now_us,
+                                                       std::span<const FrontEvent> events,
+                                                       const ImuIncrement& motion,
+                                                       const Eigen::Vector3d& angular_rate) {
   since_ = joined(since_, motion);
   rate_ = angular_rate;
-  remember(now_us, events, motion);
+  append_interval(now_us, events, motion);
   if (to_seconds(t - last_slice_) < (slices_ == 0 ? pause_s() : config_.gap_s)) {
     slice_begin_ = t;
     return {};
@@ -228,63 +231,63 @@ std::optional<Capture::Found> Capture::take(TimeNs t, std::uint32_t now_us,
   double age_s = 0;
   for (const FrontEvent& e : slice_) age_s += 1e-6 * (now_us - e.stamp_us);
   age_s /= static_cast<double>(std::max<std::size_t>(1, slice_.size()));
-  turn_back(age_s, now_us);
-  field_->build(turned_);
-  Candidate prior{prior_};
-  move(prior, since_);
+  compensate_rotation(age_s, now_us);
+  field_->build(compensated_);
+  Hypothesis prior{prior_};
+  propagate(prior, since_);
   prior_ = prior.nav;
   elapsed_s_ += since_.dt_s;
   if (slices_ == 0)
-    first_slice(age_s);
+    search_around_prior(age_s);
   else
-    next_slice(age_s);
+    update_hypotheses(age_s);
   since_ = {};
   ++slices_;
-  auto found = decide();
+  auto found = accept_best();
   slice_.clear();
   slice_begin_ = last_slice_ = t;
   return found;
 }
 
-void Capture::first_slice(double age_s) {
+void Relocalizer::search_around_prior(double age_s) {
   const double widening = std::pow(kWidening, std::clamp(searches_ - kSameWidth, 0, kMostWidenings));
   Matrix6d covariance = widening * widening * prior_covariance_;
   covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(config_.velocity_sigma_m_s * elapsed_s_, 2);
-  look(prior_.T_map_body);
-  candidates_.clear();
+  select_search_points(prior_.T_map_body);
+  hypotheses_.clear();
   if (points_.empty()) return;
   const SearchView view{*field_, camera_, T_body_cam_, points_};
   for (const PoseGuess& guess :
        search_.search(view, prior_.T_map_body, covariance, static_cast<unsigned>(1 + searches_))) {
-    Candidate c{prior_};
+    Hypothesis c{prior_};
     // The slice shows where the body was age_s ago.
     c.nav.T_map_body = {guess.T_map_body.q * so3::exp(age_s * rate_),
                         guess.T_map_body.p + age_s * prior_.velocity};
-    if (candidates_.size() < static_cast<std::size_t>(config_.sharpened)) sharpen(c);
-    c.slopes = c.slope;
-    c.supports = c.support;
+    if (hypotheses_.size() < static_cast<std::size_t>(config_.sharpened)) refine(c);
+    c.mean_concentration = c.concentration;
+    c.mean_support = c.support;
     c.position_variance = std::pow(kPositionSigma_m, 2);
     c.rotation_variance = std::pow(kRotationSigma_rad, 2);
     c.velocity_variance = config_.velocity_sigma_m_s * config_.velocity_sigma_m_s;
-    candidates_.push_back(c);
+    hypotheses_.push_back(c);
   }
 }
 
-void Capture::next_slice(double age_s) {
-  for (Candidate& c : candidates_) move(c, since_);
-  if (candidates_.empty()) return;
-  look(candidates_.front().nav.T_map_body);
+void Relocalizer::update_hypotheses(double age_s) {
+  for (Hypothesis& c : hypotheses_) propagate(c, since_);
+  if (hypotheses_.empty()) return;
+  select_search_points(hypotheses_.front().nav.T_map_body);
   if (points_.empty()) return;
   const SearchView view{*field_, camera_, T_body_cam_, points_};
-  for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    Candidate& c = candidates_[i];
-    const Candidate predicted = c;
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    Hypothesis& c = hypotheses_[i];
+    const Hypothesis predicted = c;
     const bool one_by_one = i < static_cast<std::size_t>(config_.sharpened);
-    if (one_by_one) sharpen(c);
-    if (!one_by_one || c.slope < config_.least_slope) {
+    if (one_by_one) refine(c);
+    if (!one_by_one || c.concentration < config_.least_concentration) {
       // Perhaps the prediction was too far off: from where the slice's edges are.
-      Candidate other = predicted;
-      other.slope = other.support = 0;
+      Hypothesis other = predicted;
+      other.concentration = other.support = 0;
       const Eigen::Vector3d rate = has_imu_ ? rate_ : predicted.rate;
       const Pose& now = predicted.nav.T_map_body;
       const Pose then{now.q * so3::exp(-age_s * rate), now.p - age_s * predicted.nav.velocity};
@@ -293,24 +296,24 @@ void Capture::next_slice(double age_s) {
       information.tail<3>().setConstant(1 / (predicted.rotation_variance + std::pow(kRotationSigma_rad, 2)));
       const PoseGuess guess =
           search_.refine(view, then, information.asDiagonal(), 2 * config_.search.coarse_px);
-      correct(other, guess.T_map_body.minus(then));
-      if (one_by_one) sharpen(other);
+      correct_by_displacement(other, guess.T_map_body.minus(then));
+      if (one_by_one) refine(other);
       if (!one_by_one || other.support > c.support) c = other;
     }
     const Eigen::Quaterniond dq = predicted.nav.T_map_body.q.conjugate() * c.nav.T_map_body.q;
     if (!has_imu_) c.rate += (slices_ == 1 ? 1 : 0.5) / std::max(since_.dt_s, 1e-3) * so3::log(dq);
   }
-  for (Candidate& c : candidates_) {
-    c.slopes += kNewest * (c.slope - c.slopes);
-    c.supports += kNewest * (c.support - c.supports);
+  for (Hypothesis& c : hypotheses_) {
+    c.mean_concentration += kNewest * (c.concentration - c.mean_concentration);
+    c.mean_support += kNewest * (c.support - c.mean_support);
   }
-  std::stable_sort(candidates_.begin(), candidates_.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.supports > b.supports; });
-  drop_repeats();
+  std::stable_sort(hypotheses_.begin(), hypotheses_.end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.mean_support > b.mean_support; });
+  merge_duplicates();
 }
 
 /// Position and velocity by a Kalman filter of two states an axis, rotation likewise by one.
-void Capture::correct(Candidate& c, const Vector6d& moved) const {
+void Relocalizer::correct_by_displacement(Hypothesis& c, const Vector6d& moved) const {
   const double measured = std::pow(kPositionSigma_m, 2), turned = std::pow(kRotationSigma_rad, 2);
   const double gain = 1 / (c.position_variance + measured);
   c.nav.T_map_body.p += gain * c.position_variance * moved.head<3>();
@@ -324,27 +327,27 @@ void Capture::correct(Candidate& c, const Vector6d& moved) const {
 }
 
 /// Candidates that have come together go on as one. Sorted, best first.
-void Capture::drop_repeats() {
-  std::vector<Candidate> different;
-  for (const Candidate& c : candidates_)
-    if (std::none_of(different.begin(), different.end(), [&](const Candidate& other) {
+void Relocalizer::merge_duplicates() {
+  std::vector<Hypothesis> different;
+  for (const Hypothesis& c : hypotheses_)
+    if (std::none_of(different.begin(), different.end(), [&](const Hypothesis& other) {
           const Vector6d d = c.nav.T_map_body.minus(other.nav.T_map_body);
           return d.head<3>().norm() < kOne_m && d.tail<3>().norm() < kOne_rad &&
                  (c.nav.velocity - other.nav.velocity).norm() < kOne_m_s;
         }))
       different.push_back(c);
-  candidates_ = std::move(different);
+  hypotheses_ = std::move(different);
 }
 
 /// Each event at its own time against the contours, under gates that close; pose and velocity are those that
 /// the last parts agree upon.
-void Capture::sharpen(Candidate& c) {
+void Relocalizer::refine(Hypothesis& c) {
   using Vector9d = Eigen::Matrix<double, 9, 1>;
   using Matrix9d = Eigen::Matrix<double, 9, 9>;
   const ContourView view{index_.map(), pieces_, camera_, T_body_cam_, EventAlignmentConfig{}.map_sigma_m};
   const auto& chosen = all_visible_->choose(c.nav.T_map_body * T_body_cam_);
   const NavState from = c.nav;
-  const std::size_t n = std::min(parts_.size(), static_cast<std::size_t>(1 + 2 * slices_));
+  const std::size_t n = std::min(intervals_.size(), static_cast<std::size_t>(1 + 2 * slices_));
   Vector9d sure;
   sure.segment<3>(0).setConstant(1 / (kSharpenSigma_m * kSharpenSigma_m));
   sure.segment<3>(3).setConstant(1 / (kSharpenSigma_rad * kSharpenSigma_rad));
@@ -360,12 +363,13 @@ void Capture::sharpen(Candidate& c) {
       NavState nav = c.nav;
       double age_s = 0, matched = 0, asked = 0;
       for (std::size_t k = 0; k < n; ++k) {
-        const Part& part = parts_[parts_.size() - 1 - k];
-        const double span_s = part.motion.dt_s;
-        project_contours(view, chosen, {nav.T_map_body, nav.velocity, has_imu_ ? part.rate : c.rate}, span_s,
-                         samples_);
-        const EventAlignmentResult r = stage->align({part.events, part.now_us, span_s, samples_, known});
-        c.slope = r.slope;
+        const Interval& interval = intervals_[intervals_.size() - 1 - k];
+        const double span_s = interval.motion.dt_s;
+        project_contours(view, chosen, {nav.T_map_body, nav.velocity, has_imu_ ? interval.rate : c.rate},
+                         span_s, samples_);
+        const EventAlignmentResult r =
+            stage->align({interval.events, interval.now_us, span_s, samples_, known});
+        c.concentration = r.slope;
         matched += r.matched_events;
         asked += static_cast<double>(samples_.size());
         Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
@@ -375,9 +379,9 @@ void Capture::sharpen(Candidate& c) {
         H += J.transpose() * r.information * J;
         b += J.transpose() * r.vector;
         age_s += span_s;
-        nav = before(c, nav, part.motion);
+        nav = propagate_back(c, nav, interval.motion);
       }
-      c.support = c.slope * matched / std::max(1.0, asked);
+      c.support = c.concentration * matched / std::max(1.0, asked);
       const Vector9d d = H.ldlt().solve(b);
       if (!d.allFinite() || (stage == stages_.back() && step + 1 == kSteps)) continue;
       c.nav.T_map_body = c.nav.T_map_body.plus(d.head<6>());
@@ -385,22 +389,25 @@ void Capture::sharpen(Candidate& c) {
     }
 }
 
-std::optional<Capture::Found> Capture::decide() {
+std::optional<Relocalizer::Found> Relocalizer::accept_best() {
   if (slices_ < config_.least_slices) return {};
-  if (!candidates_.empty()) {
-    const Candidate& best = candidates_.front();
-    const auto rival = std::find_if(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
+  if (!hypotheses_.empty()) {
+    const Hypothesis& best = hypotheses_.front();
+    const auto rival = std::find_if(hypotheses_.begin(), hypotheses_.end(), [&](const Hypothesis& c) {
       const Vector6d d = c.nav.T_map_body.minus(best.nav.T_map_body);
       return d.head<3>().norm() >= kSame_m || d.tail<3>().norm() >= kSame_rad;
     });
-    const double others = rival == candidates_.end() ? 0 : rival->supports;
-    const bool gathers = best.slopes >= config_.least_slope && best.supports >= config_.least_lead * others;
-    const bool alone = best.slopes >= config_.low_slope && best.supports >= config_.clear_lead * others;
+    const double others = rival == hypotheses_.end() ? 0 : rival->mean_support;
+    const bool gathers = best.mean_concentration >= config_.least_concentration &&
+                         best.mean_support >= config_.least_lead * others;
+    const bool alone = best.mean_concentration >= config_.low_concentration &&
+                       best.mean_support >= config_.clear_lead * others;
     if (gathers || alone) {
       searching_ = false;
       return Found{best.nav, has_imu_ ? rate_ : best.rate};
     }
-    if (slices_ < (best.slopes >= config_.low_slope ? config_.most_slices : config_.least_slices + 1))
+    if (slices_ < (best.mean_concentration >= config_.low_concentration ? config_.most_slices
+                                                                        : config_.least_slices + 1))
       return {};
   }
   // Anew, from where the prior has come to, and wider.

@@ -7,7 +7,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/map/contour_map.h"
-#include "evpose/map/contour_pieces.h"
+#include "evpose/map/contour_segments.h"
 #include "evpose/registration/event_alignment.h"
 
 namespace evpose {
@@ -15,7 +15,7 @@ namespace evpose {
 /// What the contours are seen with.
 struct ContourView {
   const ContourMap& map;
-  const ContourPieces& pieces;
+  const ContourSegments& pieces;
   const Camera& camera;
   const Pose& T_body_cam;
   double map_sigma_m;  ///< of points that state none

@@ -62,7 +62,7 @@ void describe(ConfigTable& table, RelocalizationConfig& c) {
 }
 
 Relocalizer::Relocalizer(const RelocalizationConfig& config, const ContourIndex& index,
-                         const ContourPieces& pieces, const Camera& camera, const Pose& T_body_cam,
+                         const ContourSegments& pieces, const Camera& camera, const Pose& T_body_cam,
                          const Eigen::Vector3d& gravity_map)
     : config_(config),
       index_(index),

@@ -46,7 +46,7 @@ void describe(ConfigTable& table, RelocalizationConfig& config);
 class Relocalizer {
  public:
   /// `gravity_map`: zero when there is no IMU.
-  Relocalizer(const RelocalizationConfig& config, const ContourIndex& index, const ContourPieces& pieces,
+  Relocalizer(const RelocalizationConfig& config, const ContourIndex& index, const ContourSegments& pieces,
               const Camera& camera, const Pose& T_body_cam, const Eigen::Vector3d& gravity_map);
 
   /// Begins a search around `state`; covariance of its pose as Pose::plus.
@@ -97,7 +97,7 @@ class Relocalizer {
 
   RelocalizationConfig config_;
   const ContourIndex& index_;
-  const ContourPieces& pieces_;
+  const ContourSegments& pieces_;
   const Camera& camera_;
   Pose T_body_cam_;
   Eigen::Vector3d gravity_map_;

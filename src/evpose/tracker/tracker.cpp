@@ -121,10 +121,10 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       given_T_body_cam_(setup.T_body_cam),
       start_t_(start.t),
       last_update_(start.t),
-      pieces_(cut_contours(*setup_.map)),
+      pieces_(cut_into_segments(*setup_.map)),
       alignment_(setup_.camera->size(), config.alignment, pieces_.count) {
   if (config.fusion.slow.piece_offset == PieceOffsets::on)
-    offset_pieces_ = cut_contours(*setup_.map, config.fusion.slow.piece_m).of_point;
+    offset_pieces_ = cut_into_segments(*setup_.map, config.fusion.slow.piece_m).of_point;
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
   before_search_ = fusion_->state();

@@ -12,7 +12,7 @@
 #include "evpose/core/parallel.h"
 #include "evpose/event/event_front.h"
 #include "evpose/fusion/back_end.h"
-#include "evpose/map/contour_pieces.h"
+#include "evpose/map/contour_segments.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/event_alignment.h"
 #include "evpose/registration/registration.h"
@@ -170,7 +170,7 @@ class Tracker {
   std::deque<CheckedImu> imu_;       ///< from the state's time on; the first is at it once started
   std::deque<EventPacket> waiting_;  ///< events that arrived before their IMU samples
   std::size_t waiting_from_ = 0;     ///< consumed part of the first
-  ContourPieces pieces_;
+  ContourSegments pieces_;
   std::vector<std::uint32_t> offset_pieces_;  ///< of each map point, where the pieces have offsets
   EventAlignment alignment_;
   std::vector<AlignmentPoint> points_;   ///< of the exponential field

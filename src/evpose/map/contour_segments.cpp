@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/map/contour_pieces.h"
+#include "evpose/map/contour_segments.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace evpose {
 namespace {
 
 constexpr float kLink_m = 0.05F;     // longest step between neighbours of a chain
-constexpr float kOffLine_m = 3e-3F;  // ... and how far off the line
+constexpr float kOffLine_m = 3e-3F;  // largest distance of a neighbour from the line
 constexpr float kSameDirection = 0.98F;
 
 using Cell = std::array<std::int32_t, 3>;
@@ -72,7 +72,7 @@ void link(const std::vector<ContourPoint>& points, Chains& chains) {
 
 }  // namespace
 
-ContourPieces cut_contours(const ContourMap& map, double piece_m) {
+ContourSegments cut_into_segments(const ContourMap& map, double segment_m) {
   const std::vector<ContourPoint>& points = map.points;
   Chains chains(points.size());
   link(points, chains);
@@ -89,10 +89,10 @@ ContourPieces cut_contours(const ContourMap& map, double piece_m) {
     const std::int64_t contour = points[i].contour;
     // Chains are numbered apart from the map's contours.
     keys[i] = {contour >= 0 ? contour : -1 - static_cast<std::int64_t>(chains.find(i)),
-               cell_of(points[i].position, static_cast<float>(piece_m)), i};
+               cell_of(points[i].position, static_cast<float>(segment_m)), i};
   }
   std::sort(keys.begin(), keys.end());
-  ContourPieces out;
+  ContourSegments out;
   out.of_point.resize(points.size());
   for (std::size_t k = 0; k < keys.size(); ++k) {
     if (k > 0 && (keys[k].contour != keys[k - 1].contour || keys[k].cube != keys[k - 1].cube)) ++out.count;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/map/contour_pieces.h"
+#include "evpose/map/contour_segments.h"
 
 #include <gtest/gtest.h>
 
@@ -22,42 +22,42 @@ void add_line(ContourMap& map, const Eigen::Vector3f& from, const Eigen::Vector3
   }
 }
 
-TEST(ContourPieces, AMetreOfALineIsCutIntoShortPieces) {
+TEST(ContourSegments, AMetreOfALineIsCutIntoShortSegments) {
   ContourMap map;
   add_line(map, {0.001F, 0.001F, 0.001F}, {1, 0, 0}, 100);
-  const ContourPieces pieces = cut_contours(map);
-  EXPECT_EQ(pieces.count, 9u);  // cubes of 12 cm
-  for (std::size_t i = 1; i < 100; ++i) EXPECT_LE(pieces.of_point[i] - pieces.of_point[i - 1], 1u);
+  const ContourSegments segments = cut_into_segments(map);
+  EXPECT_EQ(segments.count, 9u);  // cubes of 12 cm
+  for (std::size_t i = 1; i < 100; ++i) EXPECT_LE(segments.of_point[i] - segments.of_point[i - 1], 1u);
 }
 
-TEST(ContourPieces, ParallelEdgesOfABoardAreApart) {
+TEST(ContourSegments, ParallelEdgesOfABoardAreApart) {
   ContourMap map;
   add_line(map, {0.01F, 0.01F, 0.01F}, {1, 0, 0}, 8);
   add_line(map, {0.01F, 0.02F, 0.01F}, {1, 0, 0}, 8);
   add_line(map, {0.01F, 0.01F, 0.01F}, {1, 0, 0}, 8, -1, 1);  // of another plane
-  EXPECT_EQ(cut_contours(map).count, 3u);
+  EXPECT_EQ(cut_into_segments(map).count, 3u);
 }
 
-TEST(ContourPieces, NumbersOfTheMapCountMoreThanDistance) {
+TEST(ContourSegments, NumbersOfTheMapCountMoreThanDistance) {
   ContourMap map;
   add_line(map, {0.01F, 0.01F, 0.01F}, {1, 0, 0}, 4, 7);
   add_line(map, {0.05F, 0.01F, 0.01F}, {1, 0, 0}, 4, 8);
-  const ContourPieces pieces = cut_contours(map);
-  EXPECT_EQ(pieces.count, 2u);
-  EXPECT_NE(pieces.of_point[3], pieces.of_point[4]);
+  const ContourSegments segments = cut_into_segments(map);
+  EXPECT_EQ(segments.count, 2u);
+  EXPECT_NE(segments.of_point[3], segments.of_point[4]);
 }
 
-TEST(ContourPieces, DoNotDependOnTheOrderOfPoints) {
+TEST(ContourSegments, DoNotDependOnTheOrderOfPoints) {
   ContourMap map;
   add_line(map, {0.01F, -0.3F, 0.01F}, {0, 1, 0}, 60);
   add_line(map, {0.01F, -0.3F, 0.03F}, {0, 1, 0}, 60);
-  const ContourPieces before = cut_contours(map);
+  const ContourSegments before = cut_into_segments(map);
   std::vector<std::size_t> order(map.points.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::shuffle(order.begin(), order.end(), std::mt19937(3));
   ContourMap shuffled;
   for (const std::size_t i : order) shuffled.points.push_back(map.points[i]);
-  const ContourPieces after = cut_contours(shuffled);
+  const ContourSegments after = cut_into_segments(shuffled);
   ASSERT_EQ(after.count, before.count);
   for (std::size_t a = 0; a < order.size(); ++a)
     for (std::size_t b = 0; b < order.size(); ++b)
@@ -65,7 +65,7 @@ TEST(ContourPieces, DoNotDependOnTheOrderOfPoints) {
                 before.of_point[order[a]] == before.of_point[order[b]]);
 }
 
-TEST(ContourPieces, NoPointsNoPieces) { EXPECT_EQ(cut_contours({}).count, 0u); }
+TEST(ContourSegments, NoPointsNoSegments) { EXPECT_EQ(cut_into_segments({}).count, 0u); }
 
 }  // namespace
 }  // namespace evpose

@@ -54,8 +54,10 @@ int print_map(const ContourMap& map) {
               f.length_m);
   for (std::size_t k = 0; k < f.by_kind_m.size(); ++k)
     if (f.by_kind_m[k] > 0)
-      std::printf("  %-8s %.1f m%s\n", kContourKindNames[k], f.by_kind_m[k],
-                  is_mark(static_cast<ContourKind>(k)) ? ", marks: nothing is aligned to them" : "");
+      std::printf("  %-13s %.1f m%s\n", kContourKindNames[k], f.by_kind_m[k],
+                  is_view_dependent(static_cast<ContourKind>(k))
+                      ? ", view-dependent: nothing is aligned to them"
+                      : "");
   std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", f.low.x(), f.high.x(),
               f.low.y(), f.high.y(), f.low.z(), f.high.z());
   std::printf("occluders  %zu triangles\nframe      %s\n", map.occluders.triangles.size(), map.frame.c_str());

@@ -65,13 +65,13 @@ int build(const BuildRequest& request) {
       "points     %zu, %.1f cm apart, noise %.1f mm, patches of %d%s\n"
       "planes     %zu hold %.1f %% of the points; %zu are facets of curved surfaces\n"
       "creases    %.1f m\nboundaries %.1f m; %.1f m of outlines left out: short or unsure\n"
-      "marks      %.1f m of shadows, %.1f m of round bodies: %zu cylinders, %zu poles\n"
+      "unaligned  %.1f m of shadows, %.1f m of round bodies: %zu cylinders, %zu poles\n"
       "time       %.1f s; normals %.2f, planes %.2f\n",
       f.points, 100 * f.scale.spacing_m, 1e3 * f.scale.noise_m, f.scale.neighbours,
       f.tiles > 1 ? text(", ", f.tiles, " tiles").c_str() : "", f.planes,
       100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved,
       of(ContourKind::crease), of(ContourKind::boundary), f.left_out_m, of(ContourKind::shadow),
-      of(ContourKind::limb), f.cylinders, f.poles, wall_s, f.normals_s, f.planes_s);
+      of(ContourKind::cylinder_axis), f.cylinders, f.poles, wall_s, f.normals_s, f.planes_s);
   if (!up.known)
     std::printf("up         unknown: neither a floor nor walls of two directions%s\n",
                 request.level ? "; not levelled" : "");

@@ -161,7 +161,7 @@ class CloudsTest(unittest.TestCase):
     def test_other_files(self):
         self.refused(b"hello, here are no points\n" * 100, "neither PLY, PCD nor LAS", name="cloud.txt")
 
-    def test_a_column_is_marked_and_told(self):
+    def test_a_column_is_recorded_and_told(self):
         random = np.random.default_rng(3)
         angle, height = random.uniform(0, 2 * np.pi, 8000), random.uniform(0, 1.5, 8000)
         radius = 0.15 + random.normal(0, NOISE_M, 8000)
@@ -172,7 +172,7 @@ class CloudsTest(unittest.TestCase):
         self.assertEqual(len(sigma), 1)
         self.assertAlmostEqual(float(sigma[0]), 0.15, delta=0.005)
         said = subprocess.run([EVPOSE, "map", "info", str(self.map)], capture_output=True, text=True, check=True).stdout
-        self.assertRegex(said, r"limb +1\.[345] m, marks")
+        self.assertRegex(said, r"cylinder_axis +1\.[345] m, view-dependent")
 
     def test_view_points_are_places(self):
         content = ply(corner())

@@ -184,7 +184,7 @@ MapScore score_map(const ContourMap& judged, const ContourMap& truth, const Poin
   ContourMap built;
   built.anchor = judged.anchor;
   for (const ContourPoint& p : judged.points)
-    if (!is_mark(p.kind)) built.points.push_back(p);
+    if (!is_view_dependent(p.kind)) built.points.push_back(p);
   const auto of_built = positions(built, truth.anchor), of_truth = positions(truth, truth.anchor);
   Tally all, crease, boundary;
   const auto of_kind = [&](ContourKind kind) -> Tally* {

@@ -50,7 +50,7 @@ struct MapScore {
 
 /// Compares contours point by point. The distance from a true contour is that across it. `cloud`: what the
 /// map was built from, to tell which true edges it saw; nullptr: all. Both maps must have tangents and
-/// lengths; marks do not count.
+/// lengths; view-dependent contours do not count.
 MapScore score_map(const ContourMap& judged, const ContourMap& truth, const PointCloud* cloud,
                    const MapScoreConfig& config);
 

@@ -9,18 +9,18 @@
 
 namespace evpose {
 
-/// Numbers as in the files. A limb is a curved body, drawn along its axis, with its radius for sigma; a
-/// shadow is where a surface merely stops being seen.
+/// Numbers as in the files. A cylinder axis stands for a round body, with the body's radius for sigma. A
+/// shadow is where a surface merely stops being seen by the scanner.
 enum class ContourKind : std::uint8_t {
   unknown = 0,
   crease = 1,
   boundary = 2,
   marking = 3,
-  limb = 4,
+  cylinder_axis = 4,
   shadow = 5
 };
-inline constexpr std::array<const char*, 6> kContourKindNames{"unknown", "crease", "boundary",
-                                                              "marking", "limb",   "shadow"};
+inline constexpr std::array<const char*, 6> kContourKindNames{"unknown", "crease",        "boundary",
+                                                              "marking", "cylinder_axis", "shadow"};
 inline constexpr std::size_t kContourKinds = kContourKindNames.size();
 
 /// Later versions' kinds are unknown ones.
@@ -28,8 +28,11 @@ constexpr ContourKind contour_kind(std::uint8_t number) {
   return number < kContourKinds ? static_cast<ContourKind>(number) : ContourKind::unknown;
 }
 
-/// Marks are for people: silhouettes move with the eye, shadows with the scanner. Nothing is aligned to them.
-constexpr bool is_mark(ContourKind kind) { return kind == ContourKind::limb || kind == ContourKind::shadow; }
+/// View-dependent contours are in the map for people to see: silhouettes of round bodies move with the
+/// camera, shadows with the scanner. Nothing is aligned to them.
+constexpr bool is_view_dependent(ContourKind kind) {
+  return kind == ContourKind::cylinder_axis || kind == ContourKind::shadow;
+}
 
 /// A sample of a 3D contour (formats: contours.ply, map.h5).
 struct ContourPoint {

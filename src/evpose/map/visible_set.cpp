@@ -116,7 +116,7 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
     keys[i] = {key_of(p, cube_m_ * kBlockCubes), key_of(p, cube_m_)};
   }
   for (std::uint32_t i = 0; i < n; ++i)
-    if (!is_mark(map.points[i].kind)) order_.push_back(i);
+    if (!is_view_dependent(map.points[i].kind)) order_.push_back(i);
   std::sort(order_.begin(), order_.end(), [&keys](std::uint32_t a, std::uint32_t b) {
     if (keys[a].block != keys[b].block) return keys[a].block < keys[b].block;
     if (keys[a].cube != keys[b].cube) return keys[a].cube < keys[b].cube;

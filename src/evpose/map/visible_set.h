@@ -20,7 +20,7 @@ class ConfigTable;
 /// grow with the map.
 class ContourIndex {
  public:
-  /// Keeps a reference to `map`, whose marks are left out. `cube_m`: edge of a cube.
+  /// Keeps a reference to `map`, whose view-dependent contours are left out. `cube_m`: edge of a cube.
   explicit ContourIndex(const ContourMap& map, double cube_m = 0.5);
 
   /// Inside a cube the points come from coarse to fine: first some that lie 16 cm apart along the contours,

@@ -64,11 +64,11 @@ TEST_F(VisibleLaws, IndexFindsWhatBruteForceFinds) {
   }
 }
 
-TEST_F(VisibleLaws, MarksAreInNoCube) {
+TEST_F(VisibleLaws, ViewDependentContoursAreInNoCube) {
   ContourMap marked = map_;
   std::set<std::uint32_t> others;
   for (std::uint32_t i = 0; i < marked.points.size(); ++i) {
-    if (i % 3 != 2) marked.points[i].kind = i % 3 == 0 ? ContourKind::limb : ContourKind::shadow;
+    if (i % 3 != 2) marked.points[i].kind = i % 3 == 0 ? ContourKind::cylinder_axis : ContourKind::shadow;
     if (i % 3 == 2) others.insert(i);
   }
   const ContourIndex index(marked);

@@ -12,7 +12,7 @@ namespace evpose::map_build {
 class Neighbours;
 
 /// A round body, relative to the cloud's anchor: a column or pipe, or a pole too thin for its points to lie
-/// on a surface. Its silhouette moves with the eye: it is marked in the map by its axis, and no contour.
+/// on a surface. Its silhouette moves with the eye: the map holds its axis, which nothing is aligned to.
 struct Cylinder {
   Eigen::Vector3d begin = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::Zero();  ///< of the axis
   double radius_m = 0;  ///< of a pole: rms distance of its points from the axis

@@ -91,10 +91,10 @@ void add_polygons(const FittedPlane& plane, std::int32_t number, const Outline& 
   }
 }
 
-/// A round body as a mark along its axis; its silhouette is as far from that as its radius.
-Piece mark_of(const Cylinder& cylinder) {
+/// The axis of a round body, whose silhouette is as far from it as its radius.
+Piece axis_of(const Cylinder& cylinder) {
   Piece out;
-  out.kind = ContourKind::limb;
+  out.kind = ContourKind::cylinder_axis;
   out.begin = cylinder.begin;
   out.end = cylinder.end;
   out.sigma_m = cylinder.radius_m;
@@ -208,7 +208,7 @@ Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config,
     const FittedPlane& plane = planes.planes[p];
     for (const Piece& piece : boundaries[p].pieces) {
       add(piece);
-      if (!is_mark(piece.kind)) pieces[p].push_back(piece);
+      if (!is_view_dependent(piece.kind)) pieces[p].push_back(piece);
     }
     figures.left_out_m += boundaries[p].left_out_m;
     for (const std::uint32_t i : plane.points) figures.in_planes += tile.holds(surface.position[i]) ? 1 : 0;
@@ -219,7 +219,7 @@ Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config,
                           static_cast<std::uint32_t>(plane.points.size()), static_cast<float>(plane.rms_m)});
   }
   for (const Cylinder& cylinder : cylinders) {
-    add(mark_of(cylinder));
+    add(axis_of(cylinder));
     const Eigen::Vector3f middle = (0.5 * (cylinder.begin + cylinder.end)).cast<float>();
     if (tile.holds(middle)) ++(cylinder.is_pole ? figures.poles : figures.cylinders);
   }
@@ -260,7 +260,8 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   }
   out.figures.planes = map.planes.size();
   if (map.planes.empty() && barren) return *barren;
-  if (std::all_of(map.points.begin(), map.points.end(), [](const auto& p) { return is_mark(p.kind); }))
+  if (std::all_of(map.points.begin(), map.points.end(),
+                  [](const auto& p) { return is_view_dependent(p.kind); }))
     return Error{map.source, text("no contour among ", out.figures.planes, " planes"),
                  "give a larger or denser cloud"};
   map.occluders = triangulated(map.planes, map.polygons);

@@ -37,7 +37,7 @@ struct BuildFigures {
   std::size_t tiles = 0;
   std::size_t points = 0, duplicates = 0, in_planes = 0, planes = 0, curved = 0;
   CloudScale scale;
-  std::size_t cylinders = 0, poles = 0;           ///< marked
+  std::size_t cylinders = 0, poles = 0;           ///< whose axes are in the map
   std::array<double, kContourKinds> by_kind_m{};  ///< lengths in the map
   double left_out_m = 0;                          ///< of outlines: short or unsure
   double normals_s = 0, planes_s = 0;             ///< elapsed in these steps

@@ -175,9 +175,9 @@ std::string kinds_table(const ContourMap& map) {
                     kContourKindNames[k], kinds[k].points, kinds[k].length_m,
                     kinds[k].length_m > 0 ? 1e3 * kinds[k].sigma_sum / kinds[k].length_m : 0.0);
   return out +
-         "</table><p>Limbs (curved bodies, drawn along their axes; sigma is their radius) and shadows are "
-         "marks: "
-         "nothing is aligned to them.</p>";
+         "</table><p>Cylinder axes (of round bodies; sigma is their radius) and shadows depend on the view: "
+         "nothing "
+         "is aligned to them.</p>";
 }
 
 std::string planes_table(const ContourMap& map) {

@@ -20,8 +20,10 @@ double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
 
 /// As maps that are built from clouds do.
 bool states_errors(const ContourMap& map) {
-  const auto counts = [](const ContourPoint& point) { return !is_mark(point.kind); };
-  const auto states = [](const ContourPoint& point) { return !is_mark(point.kind) && point.sigma > 0; };
+  const auto counts = [](const ContourPoint& point) { return !is_view_dependent(point.kind); };
+  const auto states = [](const ContourPoint& point) {
+    return !is_view_dependent(point.kind) && point.sigma > 0;
+  };
   const auto& points = map.points;
   return 2 * std::count_if(points.begin(), points.end(), states) >
          std::count_if(points.begin(), points.end(), counts);

@@ -27,11 +27,11 @@ OfKind of_kind(const ContourMap& map, ContourKind kind) {
   return out;
 }
 
-/// Length of edges (no marks) that run upright.
+/// Length of the aligned contours that run upright.
 double upright_edges_m(const ContourMap& map) {
   double out = 0;
   for (const ContourPoint& p : map.points)
-    if (!is_mark(p.kind) && std::abs(p.tangent.z()) > 0.9F) out += static_cast<double>(p.length);
+    if (!is_view_dependent(p.kind) && std::abs(p.tangent.z()) > 0.9F) out += static_cast<double>(p.length);
   return out;
 }
 
@@ -41,18 +41,18 @@ Scan with_floor(unsigned seed) {
   return scan;
 }
 
-TEST(Cylinders, AColumnIsMarkedByItsAxisAndRadiusAndHasNoEdges) {
+TEST(Cylinders, AColumnIsRecordedByItsAxisAndRadiusAndHasNoEdges) {
   for (const double turn : {6.283, 3.142}) {  // seen all round, and from one side
     const auto built = build(with_floor(8).cylinder({0.1, 0.2, 0}, 0.2, 2, 2500, turn).cloud());
     ASSERT_TRUE(built) << built.error().line();
     EXPECT_EQ(built->figures.cylinders, 1U);
-    const OfKind limbs = of_kind(built->map, ContourKind::limb);
-    EXPECT_NEAR(limbs.length_m, 1.9, 0.15);
-    for (std::size_t i = 0; i < limbs.at.size(); ++i) {
-      EXPECT_LT((limbs.at[i].head<2>() - Eigen::Vector2d(0.1, 0.2)).norm(), 0.006);
-      EXPECT_NEAR(limbs.points[i].sigma, 0.2, 0.006);
-      EXPECT_GT(std::abs(limbs.points[i].tangent.z()), 0.9999F);
-      EXPECT_EQ(limbs.points[i].contour, limbs.points[0].contour);
+    const OfKind axes = of_kind(built->map, ContourKind::cylinder_axis);
+    EXPECT_NEAR(axes.length_m, 1.9, 0.15);
+    for (std::size_t i = 0; i < axes.at.size(); ++i) {
+      EXPECT_LT((axes.at[i].head<2>() - Eigen::Vector2d(0.1, 0.2)).norm(), 0.006);
+      EXPECT_NEAR(axes.points[i].sigma, 0.2, 0.006);
+      EXPECT_GT(std::abs(axes.points[i].tangent.z()), 0.9999F);
+      EXPECT_EQ(axes.points[i].contour, axes.points[0].contour);
     }
     EXPECT_LT(upright_edges_m(built->map), 0.3);
   }
@@ -63,11 +63,11 @@ TEST(Cylinders, APoleIsFoundThoughItIsThinnerThanItsNoise) {
     const auto built = build(with_floor(41).cylinder({-0.3, 0.1, 0}, radius, 1.5, 6000).cloud());
     ASSERT_TRUE(built) << built.error().line();
     EXPECT_EQ(built->figures.poles + built->figures.cylinders, 1U);
-    const OfKind limbs = of_kind(built->map, ContourKind::limb);
-    EXPECT_NEAR(limbs.length_m, 1.4, 0.15);
-    for (std::size_t i = 0; i < limbs.at.size(); ++i) {
-      EXPECT_LT((limbs.at[i].head<2>() - Eigen::Vector2d(-0.3, 0.1)).norm(), 0.006);
-      EXPECT_LT(limbs.points[i].sigma, radius + kNoise);
+    const OfKind axes = of_kind(built->map, ContourKind::cylinder_axis);
+    EXPECT_NEAR(axes.length_m, 1.4, 0.15);
+    for (std::size_t i = 0; i < axes.at.size(); ++i) {
+      EXPECT_LT((axes.at[i].head<2>() - Eigen::Vector2d(-0.3, 0.1)).norm(), 0.006);
+      EXPECT_LT(axes.points[i].sigma, radius + kNoise);
     }
   }
 }
@@ -79,7 +79,7 @@ TEST(Cylinders, FlatThingsAreNone) {
   scan.rectangle({-1.2, 1, 0}, {2.4, 0, 0}, {0, 0, 1.5}).rectangle({-1, -0.5, 0}, {0, 0, 1}, {0.2, 0, 0});
   const auto built = build(scan.cloud());
   ASSERT_TRUE(built) << built.error().line();
-  EXPECT_EQ(of_kind(built->map, ContourKind::limb).length_m, 0);
+  EXPECT_EQ(of_kind(built->map, ContourKind::cylinder_axis).length_m, 0);
 }
 
 /// Floor and wall of 3 m, seen from 2 m before the wall at a height of 1.2 m past a box before it.
@@ -228,7 +228,7 @@ TEST(Arcs, ATablesRoundCornersAreArcsAndItsSidesStraight) {
   double round = 0, straight = 0, squares = 0, askew = 0;
   for (std::size_t i = 0; i < built->map.points.size(); ++i) {
     const ContourPoint& p = built->map.points[i];
-    if (is_mark(p.kind)) continue;
+    if (is_view_dependent(p.kind)) continue;
     const Eigen::Vector2d x = built->map.position(i).head<2>().cwiseAbs();
     const Eigen::Vector2d d = x - Eigen::Vector2d(x0 - radius, y0 - radius);
     const bool at_corner = d.minCoeff() > 0;
@@ -246,7 +246,7 @@ TEST(Arcs, ATablesRoundCornersAreArcsAndItsSidesStraight) {
   EXPECT_LT(std::sqrt(squares / (round + straight)), 0.005);
 }
 
-TEST(Marks, AreTheSameForAnyNumberOfThreads) {
+TEST(ViewDependentContours, AreTheSameForAnyNumberOfThreads) {
   const Eigen::Vector3d eye(0.2, -2, 1);
   PointCloud cloud = scene_with_shadow(47, eye);
   cloud.viewpoints = {eye};
@@ -264,7 +264,7 @@ TEST(Marks, AreTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(one->map.points[i].kind, three->map.points[i].kind);
     EXPECT_EQ(one->map.points[i].contour, three->map.points[i].contour);
   }
-  EXPECT_GT(of_kind(one->map, ContourKind::limb).length_m, 0.5);
+  EXPECT_GT(of_kind(one->map, ContourKind::cylinder_axis).length_m, 0.5);
 }
 
 }  // namespace

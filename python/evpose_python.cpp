@@ -10,11 +10,11 @@
 #include <map>
 
 #include "evpose/core/version.h"
-#include "evpose/io/calibration.h"
-#include "evpose/io/config_yaml.h"
-#include "evpose/io/contour_files.h"
-#include "evpose/io/kalibr.h"
-#include "evpose/io/ply.h"
+#include "evpose/io/calibration/calibration.h"
+#include "evpose/io/calibration/kalibr.h"
+#include "evpose/io/files/config_yaml.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/maps/ply.h"
 #include "evpose/tracker/tracker.h"
 
 namespace py = pybind11;
@@ -34,16 +34,18 @@ T value_of(Expected<T> expected) {
 
 Pose pose_of(const Eigen::Matrix4d& T) {
   const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  if (!T.allFinite() || !(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-3) || R.determinant() < 0)
+  if (!T.allFinite() || !(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-3) ||
+      R.determinant() < 0)
     throw py::value_error("T_map_body: no rigid transform; give a 4x4 matrix with a rotation");
   return Pose::from_matrix(T);
 }
 
 class PyTracker {
  public:
-  PyTracker(const std::string& map_path, const std::string& calibration_path, const Eigen::Matrix4d& T_map_body,
-            TimeNs t_ns, const Eigen::Vector3d& velocity, const std::string& imu_model,
-            const std::string& occluders, const std::map<std::string, py::object>& settings) {
+  PyTracker(const std::string& map_path, const std::string& calibration_path,
+            const Eigen::Matrix4d& T_map_body, TimeNs t_ns, const Eigen::Vector3d& velocity,
+            const std::string& imu_model, const std::string& occluders,
+            const std::map<std::string, py::object>& settings) {
     const CalibrationFile file = value_of(read_calibration(calibration_path));
     const CalibratedCamera chosen = value_of(choose_camera(file));
     size_ = chosen.intrinsics->size;
@@ -77,7 +79,7 @@ class PyTracker {
     if (t_us.ndim() != 1 || x.size() != n || y.size() != n || on.size() != n)
       throw py::value_error("events: t, x, y and p must be 1-D and equally long");
     EventPacket packet;
-    const auto *t = t_us.data();
+    const auto* t = t_us.data();
     for (py::ssize_t i = 0; i < n; ++i) {
       if (t[i] < last_us_) throw py::value_error(text("events: t[", i, "] goes back in time; sort them"));
       if (x.data()[i] >= size_.width || y.data()[i] >= size_.height)
@@ -86,8 +88,8 @@ class PyTracker {
         take(packet);
         packet.base = t[i] * kNsPerUs;
       }
-      packet.events.push_back(make_event(static_cast<std::uint32_t>(t[i] - packet.base / kNsPerUs), x.data()[i],
-                                         y.data()[i], on.data()[i] != 0));
+      packet.events.push_back(make_event(static_cast<std::uint32_t>(t[i] - packet.base / kNsPerUs),
+                                         x.data()[i], y.data()[i], on.data()[i] != 0));
       last_us_ = t[i];
     }
     take(packet);
@@ -102,7 +104,8 @@ class PyTracker {
     for (py::ssize_t i = 0; i < n; ++i) {
       const double* row = rows.data(i, 0);
       const ImuSample sample{t_ns.data()[i], {row[0], row[1], row[2]}, {row[3], row[4], row[5]}};
-      if (sample.t <= last_imu_) throw py::value_error(text("imu: t[", i, "] does not go on; sort the samples"));
+      if (sample.t <= last_imu_)
+        throw py::value_error(text("imu: t[", i, "] does not go on; sort the samples"));
       if (!sample.gyro.allFinite() || !sample.accel.allFinite())
         throw py::value_error(text("imu: sample ", i, " is not finite"));
       last_imu_ = sample.t;
@@ -147,24 +150,35 @@ PYBIND11_MODULE(evpose, m) {
   m.attr("__version__") = version();
   py::class_<Update>(m, "Update", "What the tracker says about one instant; arrays are copies")
       .def_readonly("t_ns", &Update::t, "data time, ns")
-      .def_property_readonly("T_map_body", [](const Update& u) { return u.T_map_body.matrix(); }, "4x4")
-      .def_property_readonly("position", [](const Update& u) { return u.T_map_body.p; }, "of the body in the map, m")
-      .def_property_readonly("quaternion", [](const Update& u) { return Eigen::Vector4d(u.T_map_body.q.coeffs()); },
-                             "x y z w, map from body")
-      .def_property_readonly("velocity", [](const Update& u) { return u.velocity; }, "map frame, m/s")
-      .def_property_readonly("angular_rate", [](const Update& u) { return u.angular_rate; }, "body frame, rad/s")
-      .def_property_readonly("gyro_bias", [](const Update& u) { return u.gyro_bias; }, "rad/s")
-      .def_property_readonly("accel_bias", [](const Update& u) { return u.accel_bias; }, "m/s^2")
-      .def_property_readonly("covariance", [](const Update& u) { return u.covariance; },
-                             "6x6 of (translation in the map, rotation in the body), m^2, rad^2")
-      .def_property_readonly("health", [](const Update& u) { return std::string(to_string(u.health)); },
-                             "waiting, initialising, tracking, degraded or lost")
+      .def_property_readonly(
+          "T_map_body", [](const Update& u) { return u.T_map_body.matrix(); }, "4x4")
+      .def_property_readonly(
+          "position", [](const Update& u) { return u.T_map_body.p; }, "of the body in the map, m")
+      .def_property_readonly(
+          "quaternion", [](const Update& u) { return Eigen::Vector4d(u.T_map_body.q.coeffs()); },
+          "x y z w, map from body")
+      .def_property_readonly(
+          "velocity", [](const Update& u) { return u.velocity; }, "map frame, m/s")
+      .def_property_readonly(
+          "angular_rate", [](const Update& u) { return u.angular_rate; }, "body frame, rad/s")
+      .def_property_readonly(
+          "gyro_bias", [](const Update& u) { return u.gyro_bias; }, "rad/s")
+      .def_property_readonly(
+          "accel_bias", [](const Update& u) { return u.accel_bias; }, "m/s^2")
+      .def_property_readonly(
+          "covariance", [](const Update& u) { return u.covariance; },
+          "6x6 of (translation in the map, rotation in the body), m^2, rad^2")
+      .def_property_readonly(
+          "health", [](const Update& u) { return std::string(to_string(u.health)); },
+          "waiting, initialising, tracking, degraded or lost")
       .def_readonly("reason", &Update::reason, "of the health, where it changed")
       .def_readonly("points", &Update::points)
       .def_readonly("points_matched", &Update::points_matched);
-  py::class_<PyTracker>(m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
-      .def(py::init<const std::string&, const std::string&, const Eigen::Matrix4d&, TimeNs, const Eigen::Vector3d&,
-                    const std::string&, const std::string&, const std::map<std::string, py::object>&>(),
+  py::class_<PyTracker>(
+      m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
+      .def(py::init<const std::string&, const std::string&, const Eigen::Matrix4d&, TimeNs,
+                    const Eigen::Vector3d&, const std::string&, const std::string&,
+                    const std::map<std::string, py::object>&>(),
            "map"_a, "calibration"_a, "T_map_body"_a, "t_ns"_a, "velocity"_a = Eigen::Vector3d(0, 0, 0),
            "imu_model"_a = "", "occluders"_a = "", "settings"_a = std::map<std::string, py::object>{},
            "Starts at a pose. settings: keys of evpose track --dump-config")

@@ -7,11 +7,11 @@
 #include <span>
 
 #include "evpose/core/config.h"
-#include "evpose/io/calibration.h"
-#include "evpose/io/contour_files.h"
-#include "evpose/io/event_messages.h"
-#include "evpose/io/kalibr.h"
-#include "evpose/io/ply.h"
+#include "evpose/io/bags/event_messages.h"
+#include "evpose/io/calibration/calibration.h"
+#include "evpose/io/calibration/kalibr.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/maps/ply.h"
 #include "evpose/mavlink/frames.h"
 #include "evpose/mavlink/link.h"
 #include "evpose/serve/session.h"
@@ -35,7 +35,8 @@ Expected<Setup> read_setup(const Parameters& parameters) {
   const std::pair<const char*, const std::string&> needed[] = {
       {"map", parameters.map}, {"calibration", parameters.calibration}, {"init", parameters.init}};
   for (const auto& [name, value] : needed)
-    if (value.empty()) return Error{std::string("parameter ~") + name, "is not given", "see docs/use/live.md"};
+    if (value.empty())
+      return Error{std::string("parameter ~") + name, "is not given", "see docs/use/live.md"};
   const auto calibration = read_calibration(parameters.calibration);
   if (!calibration) return calibration.error();
   const auto chosen = choose_camera(*calibration);

@@ -8,7 +8,7 @@
 #include "bench.h"
 #include "bench_streams.h"
 #include "commands.h"
-#include "evpose/io/config_yaml.h"
+#include "evpose/io/files/config_yaml.h"
 
 namespace evpose {
 namespace {

@@ -8,8 +8,8 @@
 #include "bench.h"
 #include "bench_streams.h"
 #include "commands.h"
-#include "evpose/io/config_yaml.h"
-#include "evpose/io/hdf5_file.h"
+#include "evpose/io/files/config_yaml.h"
+#include "evpose/io/hdf5/hdf5_file.h"
 
 namespace evpose {
 namespace {

@@ -11,7 +11,7 @@
 #include "bench_streams.h"
 #include "commands.h"
 #include "evpose/eval/score.h"
-#include "evpose/io/config_yaml.h"
+#include "evpose/io/files/config_yaml.h"
 
 namespace evpose {
 namespace {

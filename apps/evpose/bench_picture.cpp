@@ -11,7 +11,7 @@
 #include "bench.h"
 #include "bench_streams.h"
 #include "commands.h"
-#include "evpose/io/atomic_file.h"
+#include "evpose/io/files/atomic_file.h"
 
 namespace evpose {
 namespace {

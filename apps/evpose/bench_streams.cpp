@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "evpose/io/recording.h"
+#include "evpose/io/recording/recording.h"
 
 namespace evpose {
 

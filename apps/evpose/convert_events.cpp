@@ -4,9 +4,10 @@
 #include <cstdio>
 
 #include "convert_parts.h"
-#include "evpose/io/calibration.h"
-#include "evpose/io/numbers.h"
-#include "evpose/io/sensor_streams.h"
+#include "evpose/io/calibration/calibration.h"
+#include "evpose/io/files/numbers.h"
+#include "evpose/io/formats/create_event_writer.h"
+#include "evpose/io/formats/open_events.h"
 #include "evpose/run/progress.h"
 #include "interrupt.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "evpose/io/event_reader.h"
-#include "evpose/io/event_writer.h"
+#include "evpose/io/events/event_reader.h"
+#include "evpose/io/events/event_writer.h"
 
 namespace evpose {
 

@@ -5,13 +5,14 @@
 #include <limits>
 
 #include "convert_parts.h"
-#include "evpose/io/bag_writer.h"
-#include "evpose/io/imu_csv.h"
-#include "evpose/io/kalibr.h"
-#include "evpose/io/new_folder.h"
-#include "evpose/io/recording.h"
-#include "evpose/io/sensor_streams.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/bags/bag_writer.h"
+#include "evpose/io/calibration/kalibr.h"
+#include "evpose/io/files/new_folder.h"
+#include "evpose/io/formats/create_event_writer.h"
+#include "evpose/io/formats/open_events.h"
+#include "evpose/io/motion/imu_csv.h"
+#include "evpose/io/motion/trajectory_tum.h"
+#include "evpose/io/recording/recording.h"
 #include "interrupt.h"
 
 namespace evpose {

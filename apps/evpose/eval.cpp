@@ -9,8 +9,8 @@
 
 #include "commands.h"
 #include "evpose/eval/score.h"
-#include "evpose/io/atomic_file.h"
-#include "evpose/io/trajectory.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/motion/trajectory.h"
 #include "evpose/report/page.h"
 #include "evpose/report/summary.h"
 

@@ -6,9 +6,9 @@
 
 #include "commands.h"
 #include "evpose/core/log.h"
-#include "evpose/io/contour_files.h"
-#include "evpose/io/sensor_streams.h"
-#include "evpose/io/trajectory.h"
+#include "evpose/io/formats/open_events.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/motion/trajectory.h"
 #include "info_parts.h"
 #include "input_kind.h"
 

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <ctime>
 
-#include "evpose/io/event_formats.h"
-#include "evpose/io/event_survey.h"
-#include "evpose/io/numbers.h"
-#include "evpose/io/sensor_streams.h"
+#include "evpose/io/files/numbers.h"
+#include "evpose/io/formats/event_formats.h"
+#include "evpose/io/formats/open_events.h"
+#include "evpose/io/recording/event_survey.h"
 #include "evpose/run/progress.h"
 #include "info_parts.h"
 

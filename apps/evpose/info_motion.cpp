@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "evpose/io/imu_survey.h"
-#include "evpose/io/imu_text.h"
-#include "evpose/io/imu_units.h"
+#include "evpose/io/motion/imu_text.h"
+#include "evpose/io/motion/imu_units.h"
+#include "evpose/io/recording/imu_survey.h"
 #include "info_parts.h"
 
 namespace evpose {

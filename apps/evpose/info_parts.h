@@ -8,9 +8,9 @@
 
 #include "evpose/core/pose.h"
 #include "evpose/imu/imu.h"
-#include "evpose/io/calibration.h"
-#include "evpose/io/event_reader.h"
-#include "evpose/io/recording.h"
+#include "evpose/io/calibration/calibration.h"
+#include "evpose/io/events/event_reader.h"
+#include "evpose/io/recording/recording.h"
 #include "sheet.h"
 
 namespace evpose {

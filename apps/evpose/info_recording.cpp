@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <filesystem>
 
-#include "evpose/io/dataset_layouts.h"
-#include "evpose/io/trajectory.h"
+#include "evpose/io/motion/trajectory.h"
+#include "evpose/io/recording/dataset_layouts.h"
 #include "info_parts.h"
 
 namespace evpose {

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "evpose/io/event_formats.h"
-#include "evpose/io/hdf5_file.h"
-#include "evpose/io/imu_text.h"
-#include "evpose/io/input_file.h"
-#include "evpose/io/numbers.h"
-#include "evpose/io/trajectory.h"
+#include "evpose/io/files/input_file.h"
+#include "evpose/io/files/numbers.h"
+#include "evpose/io/formats/event_formats.h"
+#include "evpose/io/hdf5/hdf5_file.h"
+#include "evpose/io/motion/imu_text.h"
+#include "evpose/io/motion/trajectory.h"
 
 namespace evpose {
 namespace {

@@ -9,7 +9,7 @@
 #include "commands.h"
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
-#include "evpose/io/config_yaml.h"
+#include "evpose/io/files/config_yaml.h"
 #include "evpose/run/progress.h"
 #include "evpose/sim/recording_maker.h"
 

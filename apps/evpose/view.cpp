@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "commands.h"
-#include "evpose/io/contour_files.h"
-#include "evpose/io/ply.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/maps/ply.h"
 #include "evpose/view/pages.h"
 #include "evpose/view/run_view.h"
 #include "interrupt.h"

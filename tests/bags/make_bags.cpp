@@ -4,9 +4,8 @@
 #include <cstdio>
 #include <string>
 
-#include "evpose/io/bag_writer.h"
-#include "evpose/io/event_reader.h"
-#include "evpose/io/sensor_streams.h"
+#include "evpose/io/bags/bag_writer.h"
+#include "evpose/io/formats/open_events.h"
 
 namespace evpose {
 namespace {

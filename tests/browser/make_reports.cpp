@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "evpose/io/atomic_file.h"
+#include "evpose/io/files/atomic_file.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/page.h"
 #include "evpose/report/run_folder.h"

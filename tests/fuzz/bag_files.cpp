@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstring>
 
-#include "evpose/io/bag_messages.h"
-#include "evpose/io/compression.h"
-#include "evpose/io/event_messages.h"
-#include "evpose/io/imu_text.h"
-#include "evpose/io/trajectory.h"
+#include "evpose/io/bags/bag_messages.h"
+#include "evpose/io/bags/event_messages.h"
+#include "evpose/io/files/compression.h"
+#include "evpose/io/motion/imu_text.h"
+#include "evpose/io/motion/trajectory.h"
 #include "fuzz.h"
 
 namespace {

@@ -4,7 +4,7 @@
 
 #include "evpose/camera/placement.h"
 #include "evpose/core/error.h"
-#include "evpose/io/calibration.h"
+#include "evpose/io/calibration/calibration.h"
 #include "fuzz.h"
 
 EVPOSE_FUZZ_TARGET(calibrations) {

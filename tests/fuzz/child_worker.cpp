@@ -8,7 +8,7 @@
 #include <csignal>
 
 #include "evpose/core/error.h"
-#include "evpose/io/child_process.h"
+#include "evpose/io/files/child_process.h"
 
 namespace {
 

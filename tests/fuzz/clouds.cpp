@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "evpose/core/error.h"
-#include "evpose/io/cloud_files.h"
-#include "evpose/io/contour_files.h"
+#include "evpose/io/maps/cloud_files.h"
+#include "evpose/io/maps/contour_files.h"
 #include "fuzz.h"
 
 EVPOSE_FUZZ_TARGET(clouds) {

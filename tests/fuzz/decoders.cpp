@@ -7,9 +7,9 @@
 #include <string>
 
 #include "evpose/core/error.h"
-#include "evpose/io/ecf.h"
-#include "evpose/io/evt3.h"
-#include "evpose/io/hdf5_filters.h"
+#include "evpose/io/events/evt3.h"
+#include "evpose/io/hdf5/ecf.h"
+#include "evpose/io/hdf5/hdf5_filters.h"
 #include "fuzz.h"
 
 namespace evpose::fuzz {

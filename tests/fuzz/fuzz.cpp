@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fuzz.h"
 
-#include "evpose/io/event_formats.h"
-#include "evpose/io/event_reader.h"
+#include "evpose/io/formats/event_formats.h"
+#include "evpose/io/formats/open_events.h"
 
 namespace evpose::fuzz {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "evpose/core/error.h"
-#include "evpose/io/map_h5.h"
+#include "evpose/io/maps/map_h5.h"
 #include "fuzz.h"
 
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "evpose/core/log.h"
-#include "evpose/io/atomic_file.h"
+#include "evpose/io/files/atomic_file.h"
 #include "fuzz.h"
 
 namespace {

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Holds the modules of src/evpose and the program to their layers: layers.py ROOT
 
-A module includes and links only what stands on a lower line. Outside libraries, files and streams are kept to the
-modules that own them. Prints one line per fault; exit status 1 if there is one.
+A module includes and links only what stands on a lower line; so does a room of a module that has rooms. Outside
+libraries, files and streams are kept to the modules that own them. Prints one line per fault; exit status 1 if there is
+one.
 """
 import pathlib
 import re
@@ -25,6 +26,22 @@ MAY_SEE = {
     "run": TRACKER | IO | {"report"}, "report": ALL, "bench": ALL, "apps": ALL,
 }
 EMBEDDABLE = TRACKER
+
+# Modules that are divided into rooms, a folder and a target each: what each room may see of its own module besides
+# itself. Other modules may see every room.
+ROOMS = {
+    "io": {
+        "files": set(),
+        "hdf5": {"files"},
+        "events": {"files", "hdf5"},
+        "bags": {"files", "events"},
+        "calibration": {"files"},
+        "motion": {"files", "events", "bags"},
+        "maps": {"files", "hdf5"},
+        "formats": {"files", "hdf5", "events", "bags", "motion"},
+        "recording": {"files", "hdf5", "events", "bags", "calibration", "motion", "maps", "formats"},
+    },
+}
 
 # Headers of outside libraries, and who may use them.
 FORMATS = {"io", "report", "view", "bench", "apps"}
@@ -48,10 +65,10 @@ MAY_OPEN_FILES = {"io"}
 STREAMS = re.compile(r"#include <(iostream|fstream|cstdio|print)>")
 MAY_PRINT_BELOW = {"src/evpose/core/log.cpp"}  # the one place of the library that writes to stderr
 
-OURS = re.compile(r'^\s*#\s*include\s*["<]evpose/([a-z_]+)/')
+OURS = re.compile(r'^\s*#\s*include\s*["<]evpose/([a-z_]+)/(?:([a-z0-9_]+)/)?')
 RELATIVE = re.compile(r'^\s*#\s*include\s*"(?!evpose/)([^"]+)"')
 THEIRS = re.compile(r"^\s*#\s*include\s*<([^>]+)>")
-LINK = re.compile(r"\bevpose(?:::|_)([a-z_]+)\b")
+LINK = re.compile(r"\bevpose(?:::|_)([a-z0-9_]+)\b")
 COMMENT = re.compile(r"//.*|/\*.*?\*/", re.DOTALL)
 
 
@@ -67,14 +84,43 @@ def is_test(path):
     return path.stem.endswith("_test")
 
 
-def check_line(module, path, line):
+def place_of(module, folder, path):
+    """(module, room) in which a file stands; room None outside of rooms."""
+    parts = path.relative_to(folder).parts
+    return module, parts[0] if module in ROOMS and len(parts) > 1 else None
+
+
+def target_of(name):
+    """(module, room) of a library by its name, as evpose::map or evpose::io_maps; None for others."""
+    if name in MAY_SEE:
+        return name, None
+    for module, rooms in ROOMS.items():
+        if name.startswith(module + "_") and name.removeprefix(module + "_") in rooms:
+            return module, name.removeprefix(module + "_")
+    return None
+
+
+def may_see(place, other):
+    """Whether what stands in `place` may use what stands in `other`, each a (module, room)."""
+    (module, room), (other_module, other_room) = place, other
+    if module != other_module:
+        return other_module in MAY_SEE[module]
+    return room is None or room == other_room or other_room in ROOMS[module].get(room, ())
+
+
+def name_of(place):
+    return "/".join(part for part in place if part)
+
+
+def check_line(place, path, line):
     """What is wrong with one line of a source, in words."""
+    module = place[0]
     if match := OURS.match(line):
-        other = match[1]
-        if other != module and other not in MAY_SEE[module]:
-            yield f"{module} must not see {other}"
+        other = match[1], match[2] if match[1] in ROOMS else None
+        if not may_see(place, other):
+            yield f"{name_of(place)} must not see {name_of(other)}"
     if (match := RELATIVE.match(line)) and module != "apps":
-        yield f'write "evpose/{module}/..." instead of "{match[1]}"'
+        yield f'write "evpose/{name_of(place)}/..." instead of "{match[1]}"'
     if match := THEIRS.match(line):
         for name, pattern, users in OUTSIDE:
             if re.match(pattern, match[1]) and module not in users:
@@ -94,17 +140,22 @@ def check_sources(root, module, folder):
         name = path.relative_to(root).as_posix()
         if name in MAY_PRINT_BELOW:
             continue
+        place = place_of(module, folder, path)
+        if module in ROOMS and place[1] not in ROOMS[module]:
+            yield f"{name}: {module} has rooms, and this file stands in none: give it one, or a new room its line in tests/layers/layers.py"
+            continue
         for number, line in enumerate(path.read_text().splitlines(), 1):
-            for fault in check_line(module, path, line):
+            for fault in check_line(place, path, line):
                 yield f"{name}:{number}: {fault}"
 
 
 def check_links(root, module, folder):
     for path in sorted(folder.rglob("CMakeLists.txt")):
+        place = place_of(module, folder, path)
         for number, line in enumerate(path.read_text().splitlines(), 1):
-            for other in LINK.findall(line.split("#")[0]):
-                if other in MAY_SEE and other != module and other not in MAY_SEE[module]:
-                    yield f"{path.relative_to(root)}:{number}: {module} must not link {other}"
+            for other in filter(None, map(target_of, LINK.findall(line.split("#")[0]))):
+                if not may_see(place, other):
+                    yield f"{path.relative_to(root)}:{number}: {name_of(place)} must not link {name_of(other)}"
 
 
 def check(root):

@@ -28,7 +28,10 @@ class LayersTest(unittest.TestCase):
 
     def test_a_clean_tree_has_no_faults(self):
         self.assertEqual(self.faults({
-            "src/evpose/eval/a.cpp": '#include "evpose/io/a.h"\n#include "evpose/eval/a.h"\n',
+            "src/evpose/eval/a.cpp": '#include "evpose/io/files/a.h"\n#include "evpose/eval/a.h"\n',
+            "src/evpose/io/maps/a.cpp": '#include "evpose/io/files/a.h"\n#include "evpose/io/maps/a.h"\n',
+            "src/evpose/io/maps/CMakeLists.txt": "evpose_module(io_maps\n  LINKS evpose::map evpose::io_files)\n",
+            "src/evpose/io/CMakeLists.txt": "target_link_libraries(evpose_io INTERFACE evpose::io_maps)\n",
             "apps/evpose/main.cpp": "#include <CLI/CLI.hpp>\n#include \"commands.h\"\n",
         }), [])
 
@@ -39,6 +42,31 @@ class LayersTest(unittest.TestCase):
     def test_modules_of_one_line_do_not_see_each_other(self):
         self.one("src/evpose/camera/a.h", '#include "evpose/imu/imu.h"\n', "camera must not see imu")
         self.one("src/evpose/eval/a.h", '#include "evpose/sim/a.h"\n', "eval must not see sim")
+
+    def test_rooms_of_a_module_see_only_lower_ones(self):
+        self.one("src/evpose/io/files/a.h", '#include "evpose/io/maps/a.h"\n', "io/files must not see io/maps")
+        self.one("src/evpose/io/maps/a_test.cpp", '#include "evpose/io/events/a.h"\n',
+                 "io/maps must not see io/events")
+        self.one("src/evpose/io/maps/a.h", '#include "evpose/sim/a.h"\n', "io/maps must not see sim")
+
+    def test_rooms_of_a_module_link_only_lower_ones(self):
+        self.one("src/evpose/io/files/CMakeLists.txt", "evpose_module(io_files\n  LINKS evpose::io_maps)\n",
+                 "CMakeLists.txt:2", "io/files must not link io/maps")
+        self.one("src/evpose/io/files/CMakeLists.txt", "evpose_module(io_files LINKS evpose::io)\n",
+                 "io/files must not link io")
+        self.one("src/evpose/map/CMakeLists.txt", "evpose_module(map LINKS evpose::io_maps)\n",
+                 "map must not link io/maps")
+
+    def test_every_file_of_a_module_of_rooms_stands_in_one(self):
+        self.one("src/evpose/io/a.h", "\n", "io has rooms")
+        self.one("src/evpose/io/attic/a.h", "\n", "io has rooms")
+
+    def test_every_table_of_rooms_has_an_order(self):
+        for module, rooms in layers.ROOMS.items():
+            lower = set()
+            for room, seen in rooms.items():
+                self.assertLessEqual(seen, lower, f"{module}/{room} sees what is not listed before it")
+                lower.add(room)
 
     def test_tests_keep_to_the_layers_too(self):
         self.one("src/evpose/event/a_test.cpp", '#include "evpose/io/a.h"\n', "event must not see io")

@@ -12,9 +12,9 @@
 #include <functional>
 #include <random>
 
-#include "evpose/io/event_reader.h"
-#include "evpose/io/event_writer.h"
-#include "evpose/io/input_file.h"
+#include "evpose/io/files/input_file.h"
+#include "evpose/io/formats/create_event_writer.h"
+#include "evpose/io/formats/open_events.h"
 
 namespace evpose {
 namespace {

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <span>
 
-#include "evpose/io/point_grid.h"
+#include "evpose/io/maps/point_grid.h"
 #include "evpose/map/point_cloud.h"
 
 namespace evpose {

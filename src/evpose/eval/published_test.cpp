@@ -12,7 +12,7 @@
 #include <random>
 
 #include "evpose/eval/score.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/motion/trajectory_tum.h"
 
 namespace evpose {
 namespace {

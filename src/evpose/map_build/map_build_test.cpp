@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "evpose/io/map_h5.h"
-#include "evpose/io/test_files.h"
+#include "evpose/io/files/test_files.h"
+#include "evpose/io/maps/map_h5.h"
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/neighbours.h"

@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <system_error>
 
-#include "evpose/io/atomic_file.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/report/page.h"
 #include "evpose/report/state_log.h"
 #include "evpose/report/summary.h"

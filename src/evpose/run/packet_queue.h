@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "evpose/core/error.h"
-#include "evpose/io/event_reader.h"
+#include "evpose/io/events/event_reader.h"
 
 namespace evpose {
 

@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/motion/trajectory_tum.h"
 
 namespace evpose {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "evpose/core/error.h"
-#include "evpose/io/recording.h"
+#include "evpose/io/recording/recording.h"
 #include "evpose/tracker/tracker.h"
 
 namespace evpose {

@@ -8,11 +8,11 @@
 #include <chrono>
 #include <memory>
 
-#include "evpose/io/config_yaml.h"
-#include "evpose/io/contour_files.h"
-#include "evpose/io/imu_units.h"
-#include "evpose/io/ply.h"
-#include "evpose/io/recording.h"
+#include "evpose/io/files/config_yaml.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/maps/ply.h"
+#include "evpose/io/motion/imu_units.h"
+#include "evpose/io/recording/recording.h"
 #include "evpose/report/overlay.h"
 #include "evpose/run/packet_queue.h"
 #include "evpose/run/progress.h"

@@ -7,7 +7,7 @@
 
 #include "evpose/core/config.h"
 #include "evpose/core/error.h"
-#include "evpose/io/recording.h"
+#include "evpose/io/recording/recording.h"
 #include "evpose/report/run_folder.h"
 #include "evpose/tracker/tracker.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "evpose/camera/camera.h"
-#include "evpose/io/evt3.h"
+#include "evpose/io/events/evt3.h"
 #include "evpose/serve/stream_queue.h"
 
 namespace evpose {

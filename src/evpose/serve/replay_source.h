@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "evpose/io/recording.h"
+#include "evpose/io/recording/recording.h"
 #include "evpose/serve/stream_queue.h"
 
 namespace evpose {

@@ -6,9 +6,9 @@
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
-#include "evpose/io/atomic_file.h"
-#include "evpose/io/new_folder.h"
-#include "evpose/io/png_file.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/files/new_folder.h"
+#include "evpose/io/files/png_file.h"
 
 namespace evpose::sim {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evpose/core/error.h"
-#include "evpose/io/ply.h"
+#include "evpose/io/maps/ply.h"
 #include "evpose/sim/ray_caster.h"
 #include "evpose/sim/trajectory.h"
 

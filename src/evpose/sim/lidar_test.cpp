@@ -10,7 +10,7 @@
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
-#include "evpose/io/test_files.h"
+#include "evpose/io/files/test_files.h"
 #include "evpose/sim/test_scene.h"
 
 namespace evpose::sim {

@@ -15,8 +15,8 @@
 #include <numbers>
 #include <vector>
 
-#include "evpose/io/atomic_file.h"
-#include "evpose/io/ply.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/maps/ply.h"
 
 namespace evpose::sim {
 namespace {

@@ -8,8 +8,8 @@
 #include <map>
 #include <sstream>
 
-#include "evpose/io/recording.h"
-#include "evpose/io/test_files.h"
+#include "evpose/io/files/test_files.h"
+#include "evpose/io/recording/recording.h"
 
 namespace evpose::sim {
 namespace {

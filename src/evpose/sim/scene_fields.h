@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "evpose/core/pose.h"
-#include "evpose/io/yaml_document.h"
+#include "evpose/io/files/yaml_document.h"
 
 namespace evpose::sim {
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "evpose/core/parallel.h"
-#include "evpose/io/test_files.h"
+#include "evpose/io/files/test_files.h"
 #include "evpose/sim/mesh_file.h"
 
 namespace evpose::sim {

@@ -5,8 +5,8 @@
 #include <functional>
 #include <numbers>
 
-#include "evpose/io/trajectory.h"
-#include "evpose/io/waypoints.h"
+#include "evpose/io/motion/trajectory.h"
+#include "evpose/io/motion/waypoints.h"
 #include "evpose/sim/random.h"
 #include "evpose/sim/trajectory.h"
 #include "evpose/sim/trajectory_curves.h"

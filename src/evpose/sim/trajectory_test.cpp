@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "evpose/core/config.h"
-#include "evpose/io/test_files.h"
-#include "evpose/io/trajectory_tum.h"
+#include "evpose/io/files/test_files.h"
+#include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/sim/random.h"
 
 namespace evpose::sim {

@@ -6,7 +6,7 @@
 #include <map>
 #include <string_view>
 
-#include "evpose/io/atomic_file.h"
+#include "evpose/io/files/atomic_file.h"
 
 namespace evpose {
 namespace {

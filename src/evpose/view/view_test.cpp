@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "evpose/io/atomic_file.h"
+#include "evpose/io/files/atomic_file.h"
 #include "evpose/view/pages.h"
 #include "evpose/view/run_view.h"
 

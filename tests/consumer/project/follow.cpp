@@ -2,8 +2,8 @@
 // follow RECORDING MAP: tracks a recording that has ground truth, and prints each pose as it comes.
 #include <cstdio>
 
-#include "evpose/io/contour_files.h"
-#include "evpose/io/recording.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/recording/recording.h"
 #include "evpose/tracker/tracker.h"
 
 using namespace evpose;

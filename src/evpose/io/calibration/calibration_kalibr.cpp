@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
+#include "evpose/io/calibration/calibration_kinds.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kLongestShift_s = 1e6;
+
+/// Kalibr's camera models: how many of their numbers stand before fu, fv, pu, pv.
+std::size_t leading_numbers(const std::string& model) {
+  return model == "ds" || model == "eucm" ? 2 : model == "omni" ? 1 : 0;
+}
+
+/// One name for projection and distortion: pinhole's is the distortion's.
+std::string model_name(const std::string& camera, const std::string& distortion) {
+  if (camera == "pinhole") return distortion;
+  return distortion == "none" ? camera : camera + "-" + distortion;
+}
+
+Status read_model(const YamlDocument& document, const YamlNode& node, CalibratedCamera& out) {
+  const auto model = required(document, node, "camera_model");
+  if (!model) return model.error();
+  const auto projection = document.string(**model, "camera_model");
+  if (!projection) return projection.error();
+  if (*projection != "pinhole" && leading_numbers(*projection) == 0)
+    return document.error(**model, "camera_model '" + *projection + "' is not known",
+                          "Kalibr has pinhole, omni, eucm and ds");
+  const auto distortion = required(document, node, "distortion_model");
+  if (!distortion) return distortion.error();
+  const auto distortion_word = document.string(**distortion, "distortion_model");
+  if (!distortion_word) return distortion_word.error();
+  out.model_line = *projection == "pinhole" ? (*distortion)->line : (*model)->line;
+
+  // DSEC's rectified style writes the numbers as camera_matrix.
+  const char* key = node.find("intrinsics") == nullptr && node.find("camera_matrix") != nullptr
+                        ? "camera_matrix"
+                        : "intrinsics";
+  const std::size_t lead = leading_numbers(*projection);
+  const auto numbers = required_numbers(document, node, key, 4 + lead);
+  if (!numbers) return numbers.error();
+  out.numbers_line = node.find(key)->line;
+  CameraIntrinsics c;
+  c.fx = (*numbers)[lead], c.fy = (*numbers)[lead + 1];
+  c.cx = (*numbers)[lead + 2], c.cy = (*numbers)[lead + 3];
+  std::vector<double> others(numbers->begin(), numbers->begin() + static_cast<std::ptrdiff_t>(lead));
+  const YamlNode* coefficients = node.find("distortion_coeffs");
+  const std::string name = distortion_name(*distortion_word);
+  if (coefficients != nullptr) {
+    const auto values = document.numbers(*coefficients, "distortion_coeffs");
+    if (!values) return values.error();
+    others.insert(others.end(), values->begin(), values->end());
+  } else if (name != "none") {
+    return required(document, node, "distortion_coeffs").error();
+  }
+  const YamlNode& blamed = coefficients != nullptr ? *coefficients : **distortion;
+  if (auto status = set_distortion(document, blamed, model_name(*projection, name), others, c); !status)
+    return status;
+
+  const auto size = required_numbers(document, node, "resolution", 2);
+  if (!size) return size.error();
+  const auto pixels = image_size(document, *node.find("resolution"), (*size)[0], (*size)[1]);
+  if (!pixels) return pixels.error();
+  c.size = *pixels;
+  out.intrinsics = c;
+  return {};
+}
+
+Status read_shift(const YamlDocument& document, const YamlNode& node, CalibratedCamera& out) {
+  const YamlNode* shift = node.find("timeshift_cam_imu");
+  if (shift == nullptr) return {};
+  const auto value = document.number(*shift, "timeshift_cam_imu");
+  if (!value) return value.error();
+  if (std::abs(*value) > kLongestShift_s)
+    return document.error(*shift, text("timeshift_cam_imu: ", *value, " s is out of range"), "give seconds");
+  out.has_timeshift = true;
+  out.timeshift_cam_imu_s = *value;
+  return {};
+}
+
+/// Where a camera sits, by its own entries or through the camera before it.
+Status read_placement(const YamlDocument& document, const YamlNode& node, const CalibratedCamera* before,
+                      CalibratedCamera& out) {
+  auto direct = optional_transform(document, node, "T_cam_imu");
+  if (!direct) return direct.error();
+  out.T_cam_imu = *direct;
+  // OpenVINS also knows the inverse, by its name.
+  const auto inverse = optional_transform(document, node, "T_imu_cam");
+  if (!inverse) return inverse.error();
+  if (!out.T_cam_imu && *inverse) out.T_cam_imu = (*inverse)->inverse();
+  const auto step = optional_transform(document, node, "T_cn_cnm1");
+  if (!step) return step.error();
+  if (!*step || before == nullptr) return {};
+  if (!out.T_cam_imu && before->T_cam_imu) out.T_cam_imu = **step * *before->T_cam_imu;
+  if (before->T_cam_cam0) out.T_cam_cam0 = **step * *before->T_cam_cam0;
+  return {};
+}
+
+}  // namespace
+
+Expected<ImuNoise> kalibr_noise(const YamlDocument& document, const YamlNode& imu) {
+  if (const YamlNode* model = imu.find("model");
+      model != nullptr && model->scalar.starts_with("scale-misalignment"))
+    return document.error(*model, "model '" + model->scalar + "' is not supported",
+                          "calibrate with model calibrated");
+  ImuNoise noise;
+  const std::pair<const char*, double*> values[] = {{"accelerometer_noise_density", &noise.accel_density},
+                                                    {"accelerometer_random_walk", &noise.accel_walk},
+                                                    {"gyroscope_noise_density", &noise.gyro_density},
+                                                    {"gyroscope_random_walk", &noise.gyro_walk},
+                                                    {"update_rate", &noise.rate_hz}};
+  for (const auto& [key, target] : values) {
+    const auto value = required_number(document, imu, key);
+    if (!value) return value.error();
+    if (*value <= 0)
+      return document.error(*imu.find(key), text(key, ": ", *value, " is not positive"),
+                            "give Kalibr's value");
+    *target = *value;
+  }
+  return noise;
+}
+
+Expected<CalibrationFile> read_kalibr_imu_file(const YamlDocument& document) {
+  const YamlNode* nested = document.root.find("imu0");
+  const auto noise = kalibr_noise(document, nested != nullptr ? *nested : document.root);
+  if (!noise) return noise.error();
+  CalibrationFile out;
+  out.kind = "Kalibr IMU";
+  out.imu_noise = *noise;
+  return out;
+}
+
+Expected<CalibrationFile> read_kalibr_chain(const YamlDocument& document) {
+  CalibrationFile out;
+  for (int i = 0;; ++i) {
+    const std::string name = text("cam", i);
+    const YamlNode* node = document.root.find(name);
+    if (node == nullptr) break;
+    CalibratedCamera camera;
+    camera.name = name;
+    if (auto status = read_model(document, *node, camera); !status) return status.error();
+    if (auto status = read_shift(document, *node, camera); !status) return status.error();
+    if (i == 0) camera.T_cam_cam0 = Pose{};
+    const CalibratedCamera* before = i == 0 ? nullptr : &out.cameras.back();
+    if (auto status = read_placement(document, *node, before, camera); !status) return status.error();
+    out.cameras.push_back(std::move(camera));
+  }
+  if (out.cameras.empty())
+    return Error{document.path, "no entry 'cam0'", "give Kalibr's camchain, numbered from cam0"};
+  const bool with_imu = out.cameras.front().T_cam_imu.has_value();
+  out.kind = with_imu ? "Kalibr camera chain with IMU" : "Kalibr camera chain";
+  if (const YamlNode* imu = document.root.find("imu0")) {
+    const auto noise = kalibr_noise(document, *imu);
+    if (!noise) return noise.error();
+    out.imu_noise = *noise;
+  }
+  return out;
+}
+
+Expected<CalibrationFile> read_dsec(const YamlDocument& document) {
+  const YamlNode& intrinsics = *document.root.find("intrinsics");
+  const YamlNode& extrinsics = *document.root.find("extrinsics");
+  CalibrationFile out;
+  out.kind = "DSEC cameras";
+  for (int i = 0;; ++i) {
+    const YamlNode* node = intrinsics.find(text("cam", i));
+    if (node == nullptr) break;
+    CalibratedCamera camera;
+    camera.name = text("cam", i);
+    if (auto status = read_model(document, *node, camera); !status) return status.error();
+    if (const YamlNode* type = node->find("camera_type")) camera.sees = type->scalar;
+    if (i == 0) {
+      camera.T_cam_cam0 = Pose{};
+    } else {
+      const std::string key = text("T_", i, i - 1);  // cam(i - 1) to cam i
+      const auto step = required(document, extrinsics, key);
+      if (!step) return step.error();
+      const auto T = document.transform(**step, key);
+      if (!T) return T.error();
+      camera.T_cam_cam0 = *T * *out.cameras.back().T_cam_cam0;
+    }
+    out.cameras.push_back(std::move(camera));
+  }
+  if (out.cameras.empty())
+    return document.error(intrinsics, "no entry 'cam0'", "give DSEC's cam_to_cam.yaml");
+  return out;
+}
+
+}  // namespace evpose

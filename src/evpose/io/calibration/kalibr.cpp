@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/calibration/kalibr.h"
+
+#include <array>
+#include <charconv>
+
+#include "evpose/io/files/atomic_file.h"
+
+namespace evpose {
+namespace {
+
+std::string exact(double value) {
+  std::array<char, 40> buffer{};
+  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
+}
+
+std::string list(const std::vector<double>& values) {
+  std::string out = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) out += (i == 0 ? "" : ", ") + exact(values[i]);
+  return out + "]";
+}
+
+}  // namespace
+
+Status write_kalibr_camera(const std::string& path, const CalibratedCamera& camera) {
+  EVPOSE_CHECK(camera.intrinsics.has_value());
+  const CameraIntrinsics& c = *camera.intrinsics;
+  const bool sphere = c.distortion_model == "ds";  // a camera model of its own there
+  std::vector<double> numbers = {c.fx, c.fy, c.cx, c.cy};
+  if (sphere) numbers.insert(numbers.begin(), c.distortion.begin(), c.distortion.end());
+  std::string out = text("cam0:\n  camera_model: ", sphere ? "ds" : "pinhole", "\n");
+  out += "  distortion_coeffs: " + list(sphere ? std::vector<double>{} : c.distortion) + "\n";
+  out += "  distortion_model: " + (sphere ? "none" : c.distortion_model) + "\n";
+  out += "  intrinsics: " + list(numbers) + "\n";
+  out += text("  resolution: [", c.size.width, ", ", c.size.height, "]\n");
+  if (camera.T_cam_imu) {
+    const Eigen::Matrix4d T = camera.T_cam_imu->matrix();
+    out += "  T_cam_imu:\n";
+    for (int r = 0; r < 4; ++r) out += "  - " + list({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}) + "\n";
+    out += "  timeshift_cam_imu: " + exact(camera.timeshift_cam_imu_s) + "\n";
+  }
+  return write_text_file(path, out);
+}
+
+Expected<ImuNoise> read_imu_noise(const std::string& path) {
+  const auto file = read_calibration(path);
+  if (!file) return file.error();
+  if (!file->imu_noise)
+    return Error{path, text("a file of the kind '", file->kind, "' holds no IMU noise"),
+                 "give imu.yaml as Kalibr writes it"};
+  return *file->imu_noise;
+}
+
+Status write_kalibr_imu(const std::string& path, const ImuNoise& noise) {
+  return write_text_file(path, "accelerometer_noise_density: " + exact(noise.accel_density) +
+                                   "\naccelerometer_random_walk: " + exact(noise.accel_walk) +
+                                   "\ngyroscope_noise_density: " + exact(noise.gyro_density) +
+                                   "\ngyroscope_random_walk: " + exact(noise.gyro_walk) +
+                                   "\nupdate_rate: " + exact(noise.rate_hz) + "\n");
+}
+
+}  // namespace evpose

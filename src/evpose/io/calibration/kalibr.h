@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "evpose/core/error.h"
+#include "evpose/imu/imu.h"
+#include "evpose/io/calibration/calibration.h"
+
+namespace evpose {
+
+// Files as Kalibr writes them; read_calibration() reads them.
+
+/// As cam0. Without T_cam_imu neither it nor the shift is written. A camera without intrinsics is a fault of
+/// ours.
+Status write_kalibr_camera(const std::string& path, const CalibratedCamera& camera);
+
+/// The noise of any calibration file that has one. Errors name the line: missing or non-positive values, a
+/// model with scale and misalignment.
+Expected<ImuNoise> read_imu_noise(const std::string& path);
+Status write_kalibr_imu(const std::string& path, const ImuNoise& noise);
+
+}  // namespace evpose

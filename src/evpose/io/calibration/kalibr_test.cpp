@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/calibration/kalibr.h"
+
+#include <gtest/gtest.h>
+
+#include "evpose/io/files/test_files.h"
+
+namespace evpose {
+namespace {
+
+const std::string kCamera =
+    "cam0:\n"
+    "  camera_model: pinhole\n"
+    "  distortion_coeffs: [-0.1, 0.02, 0.0005, -0.0003]\n"
+    "  distortion_model: radtan\n"
+    "  intrinsics: [381.0, 382.0, 322.4, 236.9]\n"
+    "  resolution: [640, 480]\n"
+    "  T_cam_imu:\n"
+    "  - [0.0, -1.0, 0.0, 0.1]\n"
+    "  - [0.0, 0.0, -1.0, 0.2]\n"
+    "  - [1.0, 0.0, 0.0, 0.3]\n"
+    "  - [0.0, 0.0, 0.0, 1.0]\n"
+    "  timeshift_cam_imu: -0.002\n";
+
+Expected<CalibratedCamera> read_camera(const std::string& path, int index = 0) {
+  const auto file = read_calibration(path);
+  if (!file) return file.error();
+  return choose_camera(*file, index);
+}
+
+std::string replaced(std::string s, const std::string& from, const std::string& to) {
+  const auto at = s.find(from);
+  EVPOSE_CHECK(at != std::string::npos);
+  return s.replace(at, from.size(), to);
+}
+
+TEST(Kalibr, CameraIsReadAsWritten) {
+  const TemporaryFolder folder;
+  const auto camera = read_camera(folder.file("c.yaml", kCamera));
+  ASSERT_TRUE(camera.ok()) << error_line(camera);
+  EXPECT_EQ(camera->intrinsics->fx, 381);
+  EXPECT_EQ(camera->intrinsics->fy, 382);
+  EXPECT_EQ(camera->intrinsics->cx, 322.4);
+  EXPECT_EQ(camera->intrinsics->cy, 236.9);
+  EXPECT_EQ(camera->intrinsics->size, (ImageSize{640, 480}));
+  EXPECT_EQ(camera->intrinsics->distortion, (std::vector<double>{-0.1, 0.02, 0.0005, -0.0003}));
+  EXPECT_TRUE(camera->T_cam_imu.has_value());
+  EXPECT_EQ(camera->timeshift_cam_imu_s, -0.002);
+  // A point one metre ahead of the body is one metre ahead of the camera.
+  EXPECT_LT((*camera->T_cam_imu * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 0.2, 1.3)).norm(), 1e-12);
+
+  ASSERT_TRUE(write_kalibr_camera(folder / "d.yaml", *camera).ok());
+  const auto again = read_camera(folder / "d.yaml");
+  ASSERT_TRUE(again.ok()) << error_line(again);
+  EXPECT_LT(again->T_cam_imu->minus(*camera->T_cam_imu).norm(), 1e-12);
+  EXPECT_EQ(again->intrinsics->distortion, camera->intrinsics->distortion);
+  EXPECT_EQ(again->timeshift_cam_imu_s, camera->timeshift_cam_imu_s);
+}
+
+TEST(Kalibr, ExtrinsicsRunAlongTheChain) {
+  const TemporaryFolder folder;
+  const std::string second =
+      "cam1:\n  camera_model: pinhole\n  distortion_model: none\n  distortion_coeffs: []\n"
+      "  intrinsics: [100, 100, 50, 50]\n  resolution: [100, 100]\n"
+      "  T_cn_cnm1: [1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n";
+  const auto camera = read_camera(folder.file("c.yaml", kCamera + second), 1);
+  ASSERT_TRUE(camera.ok()) << error_line(camera);
+  EXPECT_TRUE(camera->T_cam_imu.has_value());
+  EXPECT_LT((*camera->T_cam_imu * Eigen::Vector3d::Zero() - Eigen::Vector3d(-0.4, 0.2, 0.3)).norm(), 1e-12);
+}
+
+TEST(Kalibr, WithoutExtrinsicsItSaysSo) {
+  const TemporaryFolder folder;
+  const std::string alone = kCamera.substr(0, kCamera.find("  T_cam_imu"));
+  const auto camera = read_camera(folder.file("c.yaml", alone));
+  ASSERT_TRUE(camera.ok()) << error_line(camera);
+  EXPECT_FALSE(camera->T_cam_imu.has_value());
+}
+
+TEST(Kalibr, ErrorsNameTheLine) {
+  const TemporaryFolder folder;
+  const auto line = [&](const std::string& from, const std::string& to) {
+    return error_line(read_camera(folder.file("c.yaml", replaced(kCamera, from, to))));
+  };
+  EXPECT_TRUE(says(line("pinhole", "omni"), {"c.yaml:5", "intrinsics: 4 numbers instead of 5"}));
+  EXPECT_TRUE(says(line("radtan", "fov"), {"c.yaml:4", "fov"}));
+  EXPECT_TRUE(says(line(", -0.0003", ""), {"c.yaml:3", "3 numbers", "4"}));
+  EXPECT_TRUE(says(line("381.0", "nan"), {"c.yaml:5", "intrinsics", "nan"}));
+  EXPECT_TRUE(says(line("381.0", "-381.0"), {"c.yaml:5"}));
+  EXPECT_TRUE(says(line("resolution: [640", "resolution: [640.5"), {"c.yaml:6", "640.5"}));
+  EXPECT_TRUE(says(line("resolution: [", "resolution: [["), {"c.yaml:"}));
+  EXPECT_TRUE(says(line("resolution", "resolutoin"), {"c.yaml:1", "'resolution' is missing"}));
+  EXPECT_TRUE(says(line("[0.0, -1.0,", "[0.1, -1.0,"), {"c.yaml:7", "T_cam_imu", "orthonormal"}));
+  EXPECT_TRUE(says(line("[0.0, -1.0, 0.0", "[0.0, 1.0, 0.0"), {"c.yaml:7", "mirrors"}));
+  EXPECT_TRUE(says(line("0.0, 0.0, 0.0, 1.0", "0.0, 0.0, 0.5, 1.0"), {"c.yaml:7", "last row"}));
+  EXPECT_TRUE(says(line("cam0", "cam1"), {"c.yaml", "cam0"}));
+}
+
+TEST(Kalibr, ImuModelInBothShapes) {
+  const TemporaryFolder folder;
+  const ImuNoise noise{1e-3, 2e-4, 3e-4, 4e-5, 500};
+  ASSERT_TRUE(write_kalibr_imu(folder / "imu.yaml", noise).ok());
+  const std::string plain = content_of(folder / "imu.yaml");
+  std::string nested = "imu0:\n";
+  for (std::size_t at = 0; at < plain.size(); at = plain.find('\n', at) + 1)
+    nested += "  " + plain.substr(at, plain.find('\n', at) + 1 - at);
+  for (const std::string& content : {plain, nested, "%YAML:1.0 # OpenCV's heading\n" + nested}) {
+    const auto again = read_imu_noise(folder.file("imu.yaml", content));
+    ASSERT_TRUE(again.ok()) << error_line(again);
+    EXPECT_EQ(again->accel_density, noise.accel_density);
+    EXPECT_EQ(again->accel_walk, noise.accel_walk);
+    EXPECT_EQ(again->gyro_density, noise.gyro_density);
+    EXPECT_EQ(again->gyro_walk, noise.gyro_walk);
+    EXPECT_EQ(again->rate_hz, noise.rate_hz);
+  }
+  const auto line = [&](const std::string& content) {
+    return error_line(read_imu_noise(folder.file("i.yaml", content)));
+  };
+  EXPECT_TRUE(says(line(replaced(plain, "0.001", "0")), {"i.yaml:1", "not positive"}));
+  EXPECT_TRUE(says(line(replaced(plain, "update_rate", "rate")), {"i.yaml:1", "update_rate"}));
+  EXPECT_TRUE(says(line(plain + "model: scale-misalignment\n"), {"i.yaml:6", "scale-misalignment"}));
+}
+
+TEST(Kalibr, PublishedCalibrationsAreRead) {
+  const std::string folder = shared_folder() + "/data/real/formats/calibrations/";
+  EVPOSE_NEEDS_SHARED(folder);
+  const auto mvsec = read_camera(folder + "kalibr_mvsec_camchain-imucam-indoor_flying.yaml");
+  ASSERT_TRUE(mvsec.ok()) << error_line(mvsec);
+  EXPECT_EQ(mvsec->intrinsics->fx, 226.38018519795807);
+  EXPECT_EQ(mvsec->intrinsics->size, (ImageSize{346, 260}));
+  const auto tum_vi = read_camera(folder + "openvins_tum_vi_kalibr_imucam_chain.yaml", 1);
+  ASSERT_TRUE(tum_vi.ok()) << error_line(tum_vi);
+  EXPECT_NEAR(tum_vi->T_cam_imu->p.x(), -0.053697434688869734, 1e-12);
+  const auto flat = read_camera(folder + "kalibr_padrl_camchain-imucam.yaml");
+  ASSERT_TRUE(flat.ok()) << error_line(flat);
+  EXPECT_NEAR(flat->timeshift_cam_imu_s, 0.08140089931412792, 1e-15);
+  const auto imu = read_imu_noise(folder + "openvins_uzhfpv_indoor_kalibr_imu_chain.yaml");
+  EXPECT_TRUE(imu.ok()) << error_line(imu);
+}
+
+}  // namespace
+}  // namespace evpose

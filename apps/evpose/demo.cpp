@@ -7,7 +7,7 @@
 #include "commands.h"
 #include "evpose/run/progress.h"
 #include "evpose/run/track_recording.h"
-#include "evpose/sim/recording_maker.h"
+#include "evpose/sim/recording/recording_maker.h"
 
 namespace evpose {
 namespace {

@@ -11,7 +11,7 @@
 #include "evpose/core/log.h"
 #include "evpose/io/files/config_yaml.h"
 #include "evpose/run/progress.h"
-#include "evpose/sim/recording_maker.h"
+#include "evpose/sim/recording/recording_maker.h"
 
 namespace evpose {
 namespace {

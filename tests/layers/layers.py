@@ -41,6 +41,13 @@ ROOMS = {
         "formats": {"files", "hdf5", "events", "bags", "motion"},
         "recording": {"files", "hdf5", "events", "bags", "calibration", "motion", "maps", "formats"},
     },
+    "sim": {
+        "world": set(),
+        "light": {"world"},
+        "flight": {"world", "light"},
+        "sensors": {"world", "light", "flight"},
+        "recording": {"world", "light", "flight", "sensors"},
+    },
 }
 
 # Headers of outside libraries, and who may use them.

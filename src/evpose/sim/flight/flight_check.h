@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+
+#include "evpose/core/error.h"
+#include "evpose/sim/flight/motion.h"
+#include "evpose/sim/light/ray_caster.h"
+
+namespace evpose::sim {
+
+/// Looks along a flight before it is rendered. Errors, with the time: the camera is inside of something or
+/// nearer than 3 cm to it; the picture would move faster than `fastest_px_s`.
+Status check_flight(const RayCaster& rays, const CameraPath& path, double duration_s, double focal_px,
+                    double fastest_px_s);
+
+}  // namespace evpose::sim

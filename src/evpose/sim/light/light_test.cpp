@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "evpose/core/parallel.h"
+#include "evpose/sim/light/stage.h"
+#include "evpose/sim/light/test_scene.h"
+#include "evpose/sim/light/view.h"
+#include "evpose/sim/world/random.h"
+#include "evpose/sim/world/texture.h"
+
+namespace evpose::sim {
+namespace {
+
+TEST(PixelRays, ShareAboveIsTheAreaOfTheCutSquare) {
+  Random random(1);
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto level = static_cast<float>(random.uniform(-1, 1));
+    const Eigen::Vector2f slope(static_cast<float>(random.uniform(-1, 1)),
+                                static_cast<float>(random.uniform(-1, 1)));
+    int above = 0;
+    constexpr int kSide = 400;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const float x = (static_cast<float>(i % kSide) + 0.5F) / kSide - 0.5F;
+      const float y = (static_cast<float>(i / kSide) + 0.5F) / kSide - 0.5F;
+      if (level + slope.x() * x + slope.y() * y > 0) ++above;
+    }
+    EXPECT_NEAR(share_above(level, slope), above / static_cast<double>(kSide * kSide), 4e-3);
+  }
+  EXPECT_EQ(share_above(0.2F, {0, 0}), 1);
+  EXPECT_EQ(share_above(-0.2F, {0, 0}), 0);
+  EXPECT_FLOAT_EQ(share_above(0.25F, {1, 0}), 0.75F);
+}
+
+// A wave along u with a period of 16 texels, on a rectangle whose texels do not halve evenly.
+TEST(Texture, MeanOverAFootprintIsThatOfThePattern) {
+  constexpr double kPeriod = 0.048;
+  const Texture texture(10 * kPeriod, 0.33, 0.003, [](double u, double) {
+    return 0.5 + 0.4 * std::sin(2 * std::numbers::pi * u / kPeriod);
+  });
+  const auto wave = [](double u, double width) {
+    const double k = std::numbers::pi * width / kPeriod;
+    return 0.5 + 0.4 * std::sin(2 * std::numbers::pi * u / kPeriod) * (k > 0 ? std::sin(k) / k : 1);
+  };
+  for (const float u : {0.01F, 0.1F, 0.317F, 0.477F}) {
+    // As fine as a texel, and on a repeat of the rectangle.
+    EXPECT_NEAR(texture.mean(u, 0.1F, {0.003F, 0}, {0, 0.003F}), wave(u, 0.003), 0.02);
+    EXPECT_NEAR(texture.mean(u - 0.48F, 0.1F + 0.33F, {0.003F, 0}, {0, 0.003F}), wave(u, 0.003), 0.02);
+    // A slanted surface: long along v, where nothing changes, or along u, where it averages out.
+    EXPECT_NEAR(texture.mean(u, 0.1F, {0.003F, 0}, {0, 0.02F}), wave(u, 0.003), 0.03);
+    EXPECT_NEAR(texture.mean(u, 0.1F, {0.048F, 0}, {0, 0.006F}), 0.5, 0.06);
+    EXPECT_NEAR(texture.mean(u, 0.1F, {0.4F, 0.1F}, {-0.1F, 0.3F}), 0.5, 0.05);
+  }
+}
+
+TEST(Surfaces, RectanglesAreOnePatchAndBoxesSix) {
+  TestScene plain;
+  const int grey = plain.material(0.5);
+  TestScene::add_box(plain.scene.mesh, {0, 0, 0}, {1, 2, 3}, grey);
+  std::int32_t first = 0;
+  const PartSurfaces surfaces = order_surfaces(plain.scene.mesh, first);
+  ASSERT_EQ(surfaces.patches.size(), 6U);
+  EXPECT_EQ(first, 12);
+  for (std::size_t i = 0; i < 12; ++i) {
+    // One edge of each triangle is the rectangle's diagonal.
+    EXPECT_EQ(std::popcount(surfaces.edges[i]), 2);
+    const Patch& patch = surfaces.patches[surfaces.patch_of[i]];
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d p = plain.scene.mesh.vertices[plain.scene.mesh.triangles[i][k]].cast<double>();
+      EXPECT_NEAR(patch.normal.dot(p) + patch.offset, 0, 1e-6);
+      EXPECT_NEAR(patch.u_axis.dot(p) + patch.u0, plain.scene.mesh.uv[i][k].x(), 1e-5);
+      EXPECT_NEAR(patch.v_axis.dot(p) + patch.v0, plain.scene.mesh.uv[i][k].y(), 1e-5);
+    }
+    EXPECT_GT(patch.normal.dot(plain.scene.mesh.vertices[plain.scene.mesh.triangles[i][0]].cast<double>() -
+                               Eigen::Vector3d(0.5, 1, 1.5)),
+              0);
+  }
+}
+
+// What a lamp gives follows from its distance; nothing comes through a plate, half a lamp past its rim.
+TEST(Lighting, LampFollowsTheSquareOfDistanceAndThrowsShadows) {
+  TestScene plain;
+  plain.add({2, -1, -1}, {0, 0, 2}, {0, 2, 0}, 1);
+  plain.add({1, 0.1, -1}, {0, 0, 2}, {0, 0.9, 0}, 1);  // hides the lamp from y > 0.2 on the wall
+  Light& lamp = plain.scene.lights[0];
+  lamp.kind = LightKind::lamp;
+  lamp.strength = 100;
+  lamp.position = {0, 0, 0};
+  lamp.radius = 0.02;
+  ThreadPool pool(1);
+  const Stage stage(plain.scene, pool);
+  const View view = make_view(stage, 0, looking_along_x({1.5, 0, 0}));
+  const auto at = [&](double y, double z) {
+    const PixelRay ray{
+        Eigen::Vector2f(static_cast<float>(-y / 0.5), static_cast<float>(-z / 0.5)), {1e-3F, 0}, {0, 1e-3F}};
+    return static_cast<double>(luminance(stage, view, view_patch(view, stage.still.patches[0], -1), ray)) *
+           std::numbers::pi;
+  };
+  for (const double y : {-0.5, -0.1, 0.1}) {
+    for (const double z : {-0.4, 0.3}) {
+      const double r2 = 4 + y * y + z * z;
+      EXPECT_NEAR(at(y, z), 100 / r2 * 2 / std::sqrt(r2), 0.05) << y << " " << z;
+    }
+  }
+  EXPECT_NEAR(at(0.3, 0), 0, 1e-6);
+  EXPECT_NEAR(at(0.2, 0) / (100 / 4.04 * 2 / std::sqrt(4.04)), 0.5, 0.2);
+}
+
+TEST(Lighting, SwitchingIsAFactorOfTime) {
+  LightSwitching s;
+  EXPECT_EQ(s.factor(3), 1);
+  s.off_at_s = 1;
+  s.on_at_s = 2;
+  s.off_factor = 0.1;
+  s.fade_s = 0.01;
+  EXPECT_DOUBLE_EQ(s.factor(0.999), 1);
+  EXPECT_NEAR(s.factor(1.005), 0.55, 1e-9);
+  EXPECT_NEAR(s.factor(1.5), 0.1, 1e-9);
+  EXPECT_NEAR(s.factor(2.02), 1, 1e-9);
+  EXPECT_DOUBLE_EQ(s.next_switch_s(0), 1);
+  EXPECT_DOUBLE_EQ(s.next_switch_s(1), 2);
+  EXPECT_LT(s.step_s(1.001), 1e-3);
+}
+
+// A pixel's mean through the whole path: distance and slant change the footprint, never the mean brightness.
+TEST(View, PlainWallHasOneLuminanceFromEverywhere) {
+  TestScene plain;
+  plain.add({2, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.4);
+  ThreadPool pool(1);
+  const Stage stage(plain.scene, pool);
+  const auto camera = test_camera(32, 24, 60);
+  const auto rays = pixel_rays(*camera);
+  ASSERT_TRUE(rays.ok());
+  for (const double yaw : {-0.5, 0.0, 0.7}) {
+    Pose pose = looking_along_x({1, 0.1, 0.2});
+    pose.q = so3::exp({0, 0, yaw}) * pose.q;
+    const View view = make_view(stage, 0, pose);
+    for (const PixelRay& ray : *rays)
+      EXPECT_NEAR(luminance(stage, view, view_patch(view, stage.still.patches[0], -1), ray), 0.4, 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace evpose::sim

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/light/lighting.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "evpose/core/parallel.h"
+
+namespace evpose::sim {
+namespace {
+
+constexpr int kShadowRays = 12;  // steps of a half shadow: none is seen as an edge
+constexpr int kOpenRays = 24;
+constexpr double kOpenReach_m = 1.5;  // what is farther keeps no light away
+constexpr double kTexels = 5e5;       // of a world, about
+constexpr double kFinest_m = 0.02, kCoarsest_m = 0.3;
+constexpr int kMostTexels = 2048;  // along a side
+constexpr float kOff_m = 2e-3F;    // shadow rays start so far off their surface, ...
+constexpr double kInset_m = 4e-3;  // ... and so far from its rim
+
+// Evenly spread over the unit disc (sunflower).
+std::array<Eigen::Vector2d, kOpenRays> spread(int n) {
+  std::array<Eigen::Vector2d, kOpenRays> points;
+  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  for (int i = 0; i < n; ++i)
+    points[i] = std::sqrt((i + 0.5) / n) * Eigen::Vector2d(std::cos(i * golden), std::sin(i * golden));
+  return points;
+}
+
+struct Basis {
+  Eigen::Vector3d a, b;
+};
+Basis across(const Eigen::Vector3d& n) {
+  const Eigen::Vector3d other = std::abs(n.z()) < 0.9 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d a = n.cross(other).normalized();
+  return {a, n.cross(a)};
+}
+
+class Baker {
+ public:
+  Baker(const RayCaster& rays, const LightChannels& channels) : rays_(rays), channels_(channels) {}
+
+  void light_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, float* by_channel) const {
+    const Scene& scene = rays_.scene();
+    std::fill_n(by_channel, channels_.switching.size(), 0.0F);
+    double open = -1;
+    for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+      const Light& light = scene.lights[i];
+      double lux = 0;
+      switch (light.kind) {
+        case LightKind::sun: {
+          const double facing = -normal.dot(light.direction);
+          if (facing > 0) lux = light.strength * facing * seen_sun(point, light);
+          break;
+        }
+        case LightKind::lamp: {
+          const Eigen::Vector3d way = light.position - point;
+          const double facing = normal.dot(way) / way.norm();
+          if (facing > 0) lux = light.strength * facing / way.squaredNorm() * seen_lamp(point, light);
+          break;
+        }
+        case LightKind::ambient:
+          if (open < 0) open = openness(point, normal);
+          lux = light.strength * open;
+          break;
+      }
+      by_channel[channels_.of_light[i]] += static_cast<float>(lux);
+    }
+  }
+
+ private:
+  double seen_sun(const Eigen::Vector3d& point, const Light& light) const {
+    const Basis basis = across(light.direction);
+    int seen = 0;
+    for (int i = 0; i < kShadowRays; ++i) {
+      const Eigen::Vector2d at = light.radius * disc_[i];
+      const Eigen::Vector3d way = -light.direction + at.x() * basis.a + at.y() * basis.b;
+      if (!rays_.blocked(point, way, kOff_m, std::numeric_limits<float>::infinity())) ++seen;
+    }
+    return static_cast<double>(seen) / kShadowRays;
+  }
+
+  double seen_lamp(const Eigen::Vector3d& point, const Light& light) const {
+    const Basis basis = across((light.position - point).normalized());
+    int seen = 0;
+    for (int i = 0; i < kShadowRays; ++i) {
+      const Eigen::Vector2d at = light.radius * disc_[i];
+      const Eigen::Vector3d way = light.position + at.x() * basis.a + at.y() * basis.b - point;
+      const auto length = static_cast<float>(way.norm());
+      // The lamp's own housing does not shade it.
+      const float end = 1 - std::min(0.5F, (static_cast<float>(light.radius) + 0.02F) / length);
+      if (!rays_.blocked(point, way, kOff_m / length, end)) ++seen;
+    }
+    return static_cast<double>(seen) / kShadowRays;
+  }
+
+  double openness(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+    const Basis basis = across(normal);
+    int open = 0;
+    for (const Eigen::Vector2d& at : sky_) {
+      const Eigen::Vector3d way =
+          at.x() * basis.a + at.y() * basis.b + std::sqrt(std::max(0.0, 1 - at.squaredNorm())) * normal;
+      if (!rays_.blocked(point, way, kOff_m, static_cast<float>(kOpenReach_m))) ++open;
+    }
+    return static_cast<double>(open) / kOpenRays;
+  }
+
+  const RayCaster& rays_;
+  const LightChannels& channels_;
+  std::array<Eigen::Vector2d, kOpenRays> disc_ = spread(kShadowRays), sky_ = spread(kOpenRays);
+};
+
+struct FlatTriangle {
+  std::array<Eigen::Vector2d, 3> corner;
+  std::array<Eigen::Vector3d, 3> normal;
+};
+
+double cross2(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Weights of the corners for the point of the triangle that is nearest to `p`, about: weights are cut at the
+// borders, which is exact enough for light.
+Eigen::Vector3d weights(const FlatTriangle& t, const Eigen::Vector2d& p) {
+  const Eigen::Vector2d ab = t.corner[1] - t.corner[0], ac = t.corner[2] - t.corner[0], ap = p - t.corner[0];
+  const double area = cross2(ab, ac);
+  if (std::abs(area) < 1e-12) return {1, 0, 0};
+  Eigen::Vector3d w(0, cross2(ap, ac) / area, cross2(ab, ap) / area);
+  w[0] = 1 - w[1] - w[2];
+  w = w.cwiseMax(0.0);
+  return w / w.sum();
+}
+
+// The nearest place of a patch to a texel's centre.
+struct Place {
+  Eigen::Vector2d at;
+  Eigen::Vector3d normal;
+};
+Place nearest_place(const std::vector<FlatTriangle>& triangles, const Eigen::Vector2d& p) {
+  Place best{};
+  double least = std::numeric_limits<double>::infinity();
+  for (const FlatTriangle& t : triangles) {
+    const Eigen::Vector3d w = weights(t, p);
+    const Eigen::Vector2d at = w[0] * t.corner[0] + w[1] * t.corner[1] + w[2] * t.corner[2];
+    const double distance = (at - p).squaredNorm();
+    if (distance >= least) continue;
+    least = distance;
+    const Eigen::Vector2d middle = (t.corner[0] + t.corner[1] + t.corner[2]) / 3;
+    const Eigen::Vector2d inward = middle - at;
+    const double length = inward.norm();
+    best.at = length > 0 ? Eigen::Vector2d(at + std::min(kInset_m, 0.5 * length) / length * inward) : at;
+    best.normal = (w[0] * t.normal[0] + w[1] * t.normal[1] + w[2] * t.normal[2]).normalized();
+    if (distance < 1e-12) break;
+  }
+  return best;
+}
+
+double area_of(const Mesh& mesh) {
+  double area = 0;
+  for (const Mesh::Corners& c : mesh.triangles) {
+    const Eigen::Vector3f ab = mesh.vertices[c[1]] - mesh.vertices[c[0]],
+                          ac = mesh.vertices[c[2]] - mesh.vertices[c[0]];
+    area += 0.5 * static_cast<double>(ab.cross(ac).norm());
+  }
+  return area;
+}
+
+std::vector<FlatTriangle> flatten(const Mesh& mesh, const std::vector<std::size_t>& triangles,
+                                  const LightMap& map) {
+  std::vector<FlatTriangle> flat;
+  for (const std::size_t i : triangles) {
+    FlatTriangle t;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d p = mesh.vertices[mesh.triangles[i][k]].cast<double>();
+      t.corner[k] = {map.right.dot(p), map.up.dot(p)};
+      t.normal[k] = mesh.normals[i][k].cast<double>();
+    }
+    flat.push_back(t);
+  }
+  return flat;
+}
+
+void lay_out(const std::vector<FlatTriangle>& flat, double texel_m, LightMap& map) {
+  Eigen::Vector2d low = flat[0].corner[0], high = low;
+  for (const FlatTriangle& t : flat) {
+    for (const Eigen::Vector2d& c : t.corner) {
+      low = low.cwiseMin(c);
+      high = high.cwiseMax(c);
+    }
+  }
+  const Eigen::Vector2d size = high - low;
+  const double texel = std::max(texel_m, size.maxCoeff() / (kMostTexels - 1));
+  map.per_metre = 1 / texel;
+  map.columns = 1 + static_cast<int>(std::ceil(size.x() / texel));
+  map.rows = 1 + static_cast<int>(std::ceil(size.y() / texel));
+  map.right0 = low.x();
+  map.up0 = low.y();
+}
+
+}  // namespace
+
+std::vector<float> LightChannels::factors(double t_s) const {
+  std::vector<float> out;
+  for (const LightSwitching& s : switching) out.push_back(static_cast<float>(s.factor(t_s)));
+  return out;
+}
+
+double LightChannels::step_s(double t_s) const {
+  double step = std::numeric_limits<double>::infinity();
+  for (const LightSwitching& s : switching) step = std::min(step, s.step_s(t_s));
+  return step;
+}
+
+double LightChannels::next_switch_s(double t_s) const {
+  double next = std::numeric_limits<double>::infinity();
+  for (const LightSwitching& s : switching) next = std::min(next, s.next_switch_s(t_s));
+  return next;
+}
+
+LightChannels light_channels(const Scene& scene) {
+  LightChannels channels;
+  channels.switching.emplace_back();
+  for (const Light& light : scene.lights) {
+    const LightSwitching switching = light.switching.constant() ? LightSwitching{} : light.switching;
+    auto at = std::find(channels.switching.begin(), channels.switching.end(), switching);
+    if (at == channels.switching.end()) at = channels.switching.insert(at, switching);
+    channels.of_light.push_back(static_cast<int>(at - channels.switching.begin()));
+  }
+  return channels;
+}
+
+void bake_lights(const RayCaster& rays, const LightChannels& channels, PartSurfaces& surfaces,
+                 ThreadPool& pool) {
+  const Mesh& mesh = rays.scene().mesh;
+  const Baker baker(rays, channels);
+  const double texel_m = std::clamp(std::sqrt(area_of(mesh) / kTexels), kFinest_m, kCoarsest_m);
+  std::vector<std::vector<std::size_t>> triangles(surfaces.patches.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles[surfaces.patch_of[i]].push_back(i);
+  pool.for_chunks(surfaces.patches.size(), 1, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::vector<float> light(channels.switching.size());
+    for (std::size_t k = begin; k < end; ++k) {
+      Patch& patch = surfaces.patches[k];
+      LightMap& map = patch.light;
+      const Basis basis = across(patch.normal);
+      map.right = basis.a;
+      map.up = basis.b;
+      const std::vector<FlatTriangle> flat = flatten(mesh, triangles[k], map);
+      lay_out(flat, texel_m, map);
+      const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows;
+      map.values.resize(texels * light.size());
+      for (std::size_t i = 0; i < texels; ++i) {
+        const std::size_t column = i % map.columns, row = i / map.columns;
+        const Eigen::Vector2d at(map.right0 + static_cast<double>(column) / map.per_metre,
+                                 map.up0 + static_cast<double>(row) / map.per_metre);
+        const Place place = nearest_place(flat, at);
+        const Eigen::Vector3d point =
+            place.at.x() * map.right + place.at.y() * map.up - patch.offset * patch.normal;
+        baker.light_at(point, place.normal, light.data());
+        for (std::size_t c = 0; c < light.size(); ++c) map.values[c * texels + i] = light[c];
+      }
+    }
+  });
+}
+
+void open_light(const Scene& scene, const LightChannels& channels, const Eigen::Vector3d& point,
+                const Eigen::Vector3d& normal, float* by_channel) {
+  std::fill_n(by_channel, channels.switching.size(), 0.0F);
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const Light& light = scene.lights[i];
+    double lux = light.strength;
+    if (light.kind == LightKind::sun) lux *= std::max(0.0, -normal.dot(light.direction));
+    if (light.kind == LightKind::lamp) {
+      const Eigen::Vector3d way = light.position - point;
+      lux *= std::max(0.0, normal.dot(way)) / (way.norm() * way.squaredNorm());
+    }
+    by_channel[channels.of_light[i]] += static_cast<float>(lux);
+  }
+}
+
+}  // namespace evpose::sim

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/light/stage.h"
+
+namespace evpose::sim {
+
+Stage::Stage(const Scene& of, ThreadPool& pool) : scene(of), rays(of), channels(light_channels(of)) {
+  std::int32_t first = 0;
+  still = order_surfaces(of.mesh, first);
+  for (const MovingPart& part : of.moving) moving.push_back(order_surfaces(part.mesh, first));
+  bake_lights(rays, channels, still, pool);
+}
+
+}  // namespace evpose::sim

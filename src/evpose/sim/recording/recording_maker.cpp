@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/recording/recording_maker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "evpose/core/config.h"
+#include "evpose/core/parallel.h"
+#include "evpose/io/calibration/kalibr.h"
+#include "evpose/io/events/event_truth_h5.h"
+#include "evpose/io/events/events_h5.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/files/new_folder.h"
+#include "evpose/io/maps/contour_files.h"
+#include "evpose/io/motion/imu_csv.h"
+#include "evpose/io/motion/trajectory_tum.h"
+#include "evpose/sim/flight/flight_check.h"
+#include "evpose/sim/light/scene_contours.h"
+#include "evpose/sim/light/view.h"
+#include "evpose/sim/world/scene_file.h"
+
+namespace evpose::sim {
+namespace {
+
+constexpr const char* kScenarioFile = "scenario.yaml";
+
+void switch_lamps(const LampConfig& lamps, Scene& scene) {
+  LightSwitching switching;
+  switching.off_at_s = lamps.off_at_s;
+  switching.on_at_s = lamps.on_at_s;
+  switching.off_factor = lamps.off_factor;
+  switching.fade_s = 1e-3 * lamps.fade_ms;
+  switching.flicker_hz = lamps.flicker_hz;
+  switching.flicker_depth = lamps.flicker_hz > 0 ? lamps.flicker_depth : 0;
+  if (switching.constant()) return;
+  for (Light& light : scene.lights) {
+    if (!light.daylight) light.switching = switching;
+  }
+}
+
+Expected<Scene> make_scene(const Scenario& scenario, ThreadPool& pool) {
+  auto scene = scenario.scene_file.empty() ? make_world(scenario.world, pool)
+                                           : read_scene(scenario.scene_file, scenario.world, pool);
+  if (scene) switch_lamps(scenario.lamps, *scene);
+  return scene;
+}
+
+// The camera's own motion.
+CameraPath camera_path(const Trajectory& trajectory, const Pose& T_body_cam) {
+  return [&trajectory, T_body_cam](double t_s) {
+    const Motion body = trajectory.at(t_s);
+    const Eigen::Vector3d velocity_body =
+        body.T_map_body.q.conjugate() * body.velocity + body.rate.cross(T_body_cam.p);
+    return CameraMotion{body.T_map_body * T_body_cam, T_body_cam.q.conjugate() * velocity_body,
+                        T_body_cam.q.conjugate() * body.rate};
+  };
+}
+
+// Writes events as they are delivered.
+class EventSink {
+ public:
+  static Expected<EventSink> create(const NewFolder& folder, ImageSize size, bool truth, const Scene& scene) {
+    EventSink sink;
+    auto events = EventWriterH5::create(folder.path("events.h5"), size, "evpose simulate");
+    if (!events) return events.error();
+    sink.events_.emplace(*std::move(events));
+    if (!truth) return sink;
+    auto truths = EventTruthWriter::create(folder.path("events_truth.h5"), scene.objects);
+    if (!truths) return truths.error();
+    sink.truths_.emplace(*std::move(truths));
+    return sink;
+  }
+
+  Status write(const std::vector<SimEvent>& delivered, RecordingCounts& counts) {
+    packet_.events.clear();
+    for (const SimEvent& e : delivered) {
+      if (packet_.empty()) packet_.base = e.t;
+      packet_.events.push_back(
+          make_event(static_cast<std::uint32_t>((e.t - packet_.base) / kNsPerUs), e.x, e.y, e.on));
+      ++counts.by_cause[static_cast<std::size_t>(e.cause)];
+      if (e.cause == EventCause::signal) ++counts.by_origin[static_cast<std::size_t>(e.origin)];
+      if (!truths_) continue;
+      const EventTruth truth{static_cast<std::uint8_t>(e.cause), static_cast<std::uint8_t>(e.origin),
+                             e.object};
+      if (Status done = truths_->append(truth); !done) return done;
+    }
+    return events_->append(packet_);
+  }
+
+  Status finish() {
+    if (Status done = events_->finish(); !done) return done;
+    return truths_ ? truths_->finish() : Status{};
+  }
+
+ private:
+  std::optional<EventWriterH5> events_;
+  std::optional<EventTruthWriter> truths_;
+  EventPacket packet_;
+};
+
+bool has_contrast(const RayCaster& rays, const Stage& stage, const std::vector<PixelRay>& pixel_rays,
+                  const Pose& pose) {
+  constexpr std::size_t kEvery = 37;
+  const View view = make_view(stage, 0, pose);
+  float low = std::numeric_limits<float>::infinity(), high = 0;
+  for (std::size_t i = 0; i < pixel_rays.size(); i += kEvery) {
+    const auto hit = rays.trace(pose.p, pose.q * pixel_rays[i].direction().cast<double>());
+    const float value =
+        hit ? luminance(stage, view, view_patch(view, stage.patch_of(*hit), -1), pixel_rays[i])
+            : static_cast<float>(stage.scene.sky_cd_m2);
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  return high > 0 && high > 1.01F * low;
+}
+
+class Maker {
+ public:
+  Maker(const Scenario& scenario, const NewFolder& folder, int threads, std::function<void(double)> progress)
+      : scenario_(scenario), folder_(folder), pool_(threads), progress_(std::move(progress)) {}
+
+  Expected<RecordingCounts> make();
+
+ private:
+  Status write_small_files(const Trajectory& trajectory);
+  Status write_map(const Scene& scene, const RayCaster& rays);
+  Status expose(const Stage& stage, const Camera& camera, const std::vector<PixelRay>& rays,
+                const CameraPath& path);
+  void report(double fraction) const {
+    if (progress_) progress_(fraction);
+  }
+
+  const Scenario& scenario_;
+  const NewFolder& folder_;
+  ThreadPool pool_;
+  std::function<void(double)> progress_;
+  RecordingCounts counts_;
+};
+
+Status Maker::write_small_files(const Trajectory& trajectory) {
+  const TimeNs end = from_seconds(counts_.duration_s);
+  const Pose body_cam = T_body_cam(scenario_.camera);
+  CalibratedCamera camera;
+  camera.intrinsics = intrinsics(scenario_.camera);
+  camera.T_cam_imu = body_cam.inverse();
+  camera.has_timeshift = true;
+  camera.timeshift_cam_imu_s = scenario_.imu.time_offset_s;
+  std::vector<TimedPose> body, cam;
+  for (std::int64_t k = 0;; ++k) {
+    const TimeNs t = from_seconds(static_cast<double>(k) / scenario_.truth.rate_hz);
+    if (t > end) break;
+    const Pose pose = trajectory.at(to_seconds(t)).T_map_body;
+    body.push_back({t, pose});
+    cam.push_back({t, pose * body_cam});
+  }
+  Scenario all = scenario_;
+  ConfigTable table;
+  describe(table, all);
+  if (Status done = write_text_file(folder_.path(kScenarioFile), table.to_yaml()); !done) return done;
+  if (Status done = write_tum(folder_.path("groundtruth.tum"), body); !done) return done;
+  if (Status done = write_tum(folder_.path("groundtruth_camera.tum"), cam); !done) return done;
+  if (Status done = write_kalibr_camera(folder_.path("camchain-imucam.yaml"), camera); !done) return done;
+  if (Status done = write_kalibr_imu(folder_.path("imu.yaml"), imu_noise(scenario_.imu)); !done) return done;
+  return write_imu_csv(folder_.path("imu.csv"), simulate_imu(trajectory, end, scenario_.imu,
+                                                             static_cast<std::uint64_t>(scenario_.seed)));
+}
+
+Status Maker::write_map(const Scene& scene, const RayCaster& rays) {
+  const ContourMap contours = make_contours(scene, rays, scenario_.truth.contour_spacing_m, pool_);
+  counts_.contour_points = contours.points.size();
+  if (Status done = write_ply_contours(folder_.path("contours.ply"), contours); !done) return done;
+  return write_ply_mesh(folder_.path("mesh.ply"), contours.occluders, contours.anchor);
+}
+
+Status Maker::expose(const Stage& stage, const Camera& camera, const std::vector<PixelRay>& rays,
+                     const CameraPath& path) {
+  const TimeNs end = from_seconds(counts_.duration_s);
+  auto sink = EventSink::create(folder_, camera.size(), scenario_.truth.events, stage.scene);
+  if (!sink) return sink.error();
+  auto frames = FrameCamera::create(folder_, camera.size(), scenario_.frames, end);
+  if (!frames) return frames.error();
+  EventPixels pixels(camera.size(), scenario_.events, static_cast<std::uint64_t>(scenario_.seed));
+  ReadOut read_out(camera.size(), scenario_.read_out);
+  Film film(stage, camera, rays, path, scenario_.film, pixels, pool_);
+  film.start(0);
+  std::vector<SimEvent> events, delivered;
+  for (TimeNs t = 0; t < end;) {
+    events.clear();
+    delivered.clear();
+    t = film.advance(end, frames->exposures(t, t + from_seconds(scenario_.film.block_s)), events);
+    read_out.push(events, t, delivered);
+    if (t == end) read_out.finish(delivered);
+    if (Status done = sink->write(delivered, counts_); !done) return done;
+    if (Status done = frames->develop(t); !done) return done;
+    report(static_cast<double>(t) / static_cast<double>(end));
+  }
+  counts_.read_out = read_out.counts();
+  counts_.film = film.counts();
+  counts_.frames = frames->written();
+  if (Status done = frames->finish(); !done) return done;
+  return sink->finish();
+}
+
+Expected<RecordingCounts> Maker::make() {
+  TrajectoryConfig trajectory_config = scenario_.trajectory;
+  trajectory_config.duration_s = scenario_.duration_s;
+  const auto trajectory = make_trajectory(trajectory_config);
+  if (!trajectory) return trajectory.error();
+  counts_.duration_s = scenario_.duration_s;
+
+  const auto camera = make_camera(intrinsics(scenario_.camera));
+  if (!camera) return camera.error();
+  const auto rays = pixel_rays(**camera);
+  if (!rays) return rays.error();
+  const auto scene = make_scene(scenario_, pool_);
+  if (!scene) return scene.error();
+
+  const CameraPath path = camera_path(*trajectory, T_body_cam(scenario_.camera));
+  const RayCaster look(*scene);
+  if (Status fine =
+          check_flight(look, path, counts_.duration_s, (*camera)->focal_px(), scenario_.film.fastest_px_s);
+      !fine)
+    return fine.error();
+  const Stage stage(*scene, pool_);
+  if (!has_contrast(look, stage, *rays, path(0).T_map_cam))
+    return Error{"scenario", "nothing in view has any contrast at the start",
+                 "give the world light (world.lamp_lux, world.sun_lux) and texture (world.texture_contrast)"};
+
+  const auto T_map_cam = [&](double t_s) { return path(t_s).T_map_cam; };
+  if (Status done = write_small_files(*trajectory); !done) return done.error();
+  if (Status done = write_map(*scene, look); !done) return done.error();
+  if (Status done = write_lidar(folder_.path("map_raw.ply"), look, scenario_.lidar,
+                                static_cast<std::uint64_t>(scenario_.seed), pool_);
+      !done)
+    return done.error();
+  if (Status done = write_depth(folder_, stage, *rays, (*camera)->size(), T_map_cam, scenario_.depth,
+                                from_seconds(counts_.duration_s), pool_);
+      !done)
+    return done.error();
+  if (Status done = expose(stage, **camera, *rays, path); !done) return done.error();
+  return counts_;
+}
+
+}  // namespace
+
+Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::string& folder, int threads,
+                                         const std::function<void(double)>& progress) {
+  auto temporary = NewFolder::create(folder, kScenarioFile);
+  if (!temporary) return temporary.error();
+  auto counts = Maker(scenario, *temporary, threads, progress).make();
+  if (!counts) return counts;
+  if (Status done = temporary->commit(); !done) return done.error();
+  return counts;
+}
+
+}  // namespace evpose::sim

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "evpose/core/error.h"
+#include "evpose/sim/flight/trajectory.h"
+#include "evpose/sim/sensors/camera_rig.h"
+#include "evpose/sim/sensors/event_pixels.h"
+#include "evpose/sim/sensors/film.h"
+#include "evpose/sim/sensors/frame_camera.h"
+#include "evpose/sim/sensors/imu_sensor.h"
+#include "evpose/sim/sensors/lidar.h"
+#include "evpose/sim/sensors/read_out.h"
+#include "evpose/sim/world/worlds.h"
+
+namespace evpose::sim {
+
+/// What all lamps of a world do, and the light from all sides that comes from them.
+struct LampConfig {
+  double off_at_s = -1, on_at_s = -1;  ///< negative: never
+  double off_factor = 0.02;            ///< what is left when they are off
+  double fade_ms = 2;
+  double flicker_hz = 0;  ///< of the light: twice the mains
+  double flicker_depth = 0.12;
+};
+void describe(ConfigTable& table, LampConfig& config);
+
+struct TruthConfig {
+  double rate_hz = 1000;  ///< of groundtruth.tum
+  bool events = false;    ///< events_truth.h5
+  double contour_spacing_m = 0.01;
+};
+void describe(ConfigTable& table, TruthConfig& config);
+
+/// All that a recording is made from.
+struct Scenario {
+  std::string name = "flight", description;
+  int seed = 1;  ///< of the sensors' noise; world and trajectory have their own
+  double duration_s = 3;
+  std::string scene_file;  ///< own scene; empty: `world`
+  WorldConfig world;
+  LampConfig lamps;
+  TrajectoryConfig trajectory;
+  CameraConfig camera;
+  FilmConfig film;
+  EventCameraConfig events;
+  ReadOutConfig read_out;
+  ImuConfig imu;
+  FramesConfig frames;
+  DepthConfig depth;
+  LidarConfig lidar;
+  TruthConfig truth;
+};
+void describe(ConfigTable& table, Scenario& scenario);
+
+}  // namespace evpose::sim

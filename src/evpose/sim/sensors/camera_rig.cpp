@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/sensors/camera_rig.h"
+
+#include <numbers>
+
+#include "evpose/core/config.h"
+
+namespace evpose::sim {
+
+CameraIntrinsics intrinsics(const CameraConfig& c) {
+  // Not quite square pixels, centre not quite in the middle: as calibrations come out.
+  constexpr double kSquare = 1.0008, kRight_px = 2.9, kUp_px = 2.6;
+  ImageSize size{c.width, c.height};
+  double focal_px = c.focal_px;
+  if (c.size == SensorSize::vga) {
+    size = {640, 480};
+    focal_px = 381;
+  } else if (c.size == SensorSize::hd) {
+    size = {1280, 720};
+    focal_px = 763;
+  }
+  const double scale = size.width / 640.0;
+  return {focal_px,
+          focal_px * kSquare,
+          0.5 * (size.width - 1) + kRight_px * scale,
+          0.5 * (size.height - 1) - kUp_px * scale,
+          "radtan",
+          {c.k1, c.k2, c.p1, c.p2},
+          size};
+}
+
+Pose T_body_cam(const CameraConfig& c) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  Eigen::Matrix3d R_forward_cam;  // z ahead, x to the right
+  R_forward_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Eigen::Quaterniond turn = so3::exp(c.yaw_left_deg * kDegree * Eigen::Vector3d::UnitZ()) *
+                                  so3::exp(c.pitch_down_deg * kDegree * Eigen::Vector3d::UnitY()) *
+                                  so3::exp(c.roll_deg * kDegree * Eigen::Vector3d::UnitX());
+  return {turn * Eigen::Quaterniond(R_forward_cam), {c.forward_m, c.left_m, c.up_m}};
+}
+
+void describe(ConfigTable& table, CameraConfig& c) {
+  table.add("size", c.size,
+            ConfigTable::Choices<SensorSize>{
+                {"vga", SensorSize::vga}, {"720p", SensorSize::hd}, {"custom", SensorSize::custom}},
+            "640 x 480, 1280 x 720, or as width, height and focal_px say");
+  table.add("width", c.width, "px", "of a custom sensor", {16, 8192});
+  table.add("height", c.height, "px", "of a custom sensor", {16, 8192});
+  table.add("focal_px", c.focal_px, "px", "of a custom sensor", {10, 1e5});
+  table.add("k1", c.k1, "", "radial distortion", {-1, 1});
+  table.add("k2", c.k2, "", "radial distortion", {-1, 1});
+  table.add("p1", c.p1, "", "tangential distortion", {-0.1, 0.1});
+  table.add("p2", c.p2, "", "tangential distortion", {-0.1, 0.1});
+  table.add("pitch_down_deg", c.pitch_down_deg, "deg", "of the optical axis, from straight ahead", {-90, 90});
+  table.add("yaw_left_deg", c.yaw_left_deg, "deg", "of the optical axis, from straight ahead", {-180, 180});
+  table.add("roll_deg", c.roll_deg, "deg", "about the optical axis", {-180, 180});
+  table.add("forward_m", c.forward_m, "m", "of the lens from the IMU", {-10, 10});
+  table.add("left_m", c.left_m, "m", "of the lens from the IMU", {-10, 10});
+  table.add("up_m", c.up_m, "m", "of the lens from the IMU", {-10, 10});
+}
+
+}  // namespace evpose::sim

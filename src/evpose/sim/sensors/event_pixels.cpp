@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/sensors/event_pixels.h"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "evpose/core/config.h"
+#include "evpose/core/error.h"
+
+namespace evpose::sim {
+namespace {
+
+// A threshold of a few per cent would fire on rounding.
+constexpr double kLeastThreshold = 0.02;
+// How far ahead the bounds of the quick look hold; the leak moves them by a per cent of a threshold
+// meanwhile.
+constexpr TimeNs kHorizon = 100 * kNsPerMs;
+// Slack of the quick look for the rounding of its floats, in log luminance.
+constexpr double kSlack = 2e-6;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+// Which random numbers of a pixel are used for what.
+constexpr std::uint64_t kHotStream = 1ULL << 40;
+
+double seconds(TimeNs t) { return 1e-9 * static_cast<double>(t); }
+
+/// Where a monotonic function reaches `level` in [low, high], nanoseconds. Newton, or halving where that
+/// leaves the bracket.
+template <class Function>
+double root(const Function& function, double level, double low, double high) {
+  const bool rising = function.value(high) > function.value(low);
+  double s = low;
+  for (int i = 0; i < 100 && high - low > 0.25; ++i) {
+    const double miss = function.value(s) - level;
+    if ((miss < 0) == rising) {
+      low = s;
+    } else {
+      high = s;
+    }
+    const double step = -miss / function.slope(s);
+    if (std::abs(step) < 0.05) return std::clamp(s + step, low, high);
+    s += step;
+    if (!(s > low && s < high)) s = 0.5 * (low + high);
+  }
+  return high;
+}
+
+struct Crossing {
+  TimeNs t;
+  bool on;
+};
+
+}  // namespace
+
+void describe(ConfigTable& table, EventCameraConfig& c) {
+  table.add("threshold_on", c.threshold_on, "", "rise of log luminance that makes an event",
+            {kLeastThreshold, 10});
+  table.add("threshold_off", c.threshold_off, "", "fall of log luminance that makes an event",
+            {kLeastThreshold, 10});
+  table.add("threshold_sigma", c.threshold_sigma, "", "spread of both over the pixels, 1 sigma", {0, 1});
+  table.add("refractory_us", c.refractory_us, "us", "a pixel is held in reset after an event", {0, 1e6});
+  table.add("dark_cd_m2", c.dark_cd_m2, "cd/m^2", "dark current, as luminance added to every pixel",
+            {1e-4, 1e3});
+  table.add("bandwidth_hz_per_cd_m2", c.bandwidth_hz_per_cd_m2, "Hz m^2/cd",
+            "corner of a pixel's low pass, by its luminance; 0: no low pass", {0, 1e6});
+  table.add("bandwidth_max_hz", c.bandwidth_max_hz, "Hz", "corner of a pixel's low pass in bright light",
+            {1, 1e6});
+  table.add("leak_hz", c.leak_hz, "1/s", "on events per pixel by leaking references", {0, 100});
+  table.add("shot_noise_dark_hz", c.shot_noise_dark_hz, "1/s", "noise events per pixel in darkness",
+            {0, 1e4});
+  table.add("shot_noise_bright_hz", c.shot_noise_bright_hz, "1/s", "noise events per pixel in bright light",
+            {0, 1e4});
+  table.add("shot_noise_half_cd_m2", c.shot_noise_half_cd_m2, "cd/m^2",
+            "luminance where the noise is half-way between dark and bright", {1e-4, 1e6});
+  table.add("hot_share", c.hot_share, "", "share of pixels that fire without cause", {0, 1});
+  table.add("hot_min_hz", c.hot_min_hz, "1/s", "rate of the calmest hot pixel", {1e-3, 1e5});
+  table.add("hot_max_hz", c.hot_max_hz, "1/s", "rate of the worst hot pixel", {1e-3, 1e5});
+  table.add("start_spread", c.start_spread, "",
+            "share of the threshold by which first references are off the signal", {0, 1});
+}
+
+/// Log luminance that rises or falls linearly in luminance, plus leak, over s nanoseconds from a span's
+/// start.
+class EventPixels::Ramp {
+ public:
+  Ramp(double from, double to, double length_ns, double offset, double leak_per_ns)
+      : from_(from), gain_((to - from) / length_ns), offset_(offset), leak_(leak_per_ns) {}
+  double level(double s) const { return from_ + gain_ * s; }
+  double log_luminance(double s) const { return std::log(level(s)); }
+  double value(double s) const { return log_luminance(s) + offset_ + leak_ * s; }
+  double slope(double s) const { return gain_ / level(s) + leak_; }
+  /// Where the slope is zero; NaN if nowhere.
+  double turn() const {
+    return leak_ > 0 && gain_ < 0 ? (-gain_ / leak_ - from_) / gain_
+                                  : std::numeric_limits<double>::quiet_NaN();
+  }
+
+ private:
+  double from_, gain_, offset_, leak_;
+};
+
+/// What a low pass makes of log luminance that changes linearly, plus leak.
+class EventPixels::Response {
+ public:
+  struct Input {
+    double from, to;  ///< log luminance
+    double level;     ///< cd/m^2, mean
+    double filtered;  ///< at the start
+    double length_ns, tau_ns;
+  };
+  Response(const Input& in, double offset, double leak_per_ns)
+      : level_(in.level),
+        gain_((in.to - in.from) / in.length_ns),
+        tau_(in.tau_ns),
+        start_(in.from - gain_ * in.tau_ns),
+        swing_(in.filtered - start_),
+        offset_(offset),
+        leak_(leak_per_ns) {}
+  double level(double) const { return level_; }
+  double log_luminance(double s) const { return start_ + gain_ * s + swing_ * std::exp(-s / tau_); }
+  double value(double s) const { return log_luminance(s) + offset_ + leak_ * s; }
+  double slope(double s) const { return gain_ + leak_ - swing_ / tau_ * std::exp(-s / tau_); }
+  double turn() const { return -tau_ * std::log((gain_ + leak_) * tau_ / swing_); }
+
+ private:
+  double level_, gain_, tau_, start_, swing_, offset_, leak_;
+};
+
+namespace {
+
+/// First time in (low, high] at which the signal reaches `on` or `off`, in ns from the span's start. The
+/// signal's curvature has one sign, so it turns once at most.
+template <class Signal>
+std::optional<std::pair<double, bool>> first_crossing(const Signal& signal, double low, double high,
+                                                      double on, double off) {
+  const auto crossing = [&](double a, double b) -> std::optional<std::pair<double, bool>> {
+    const double end = signal.value(b);
+    if (end >= on) return std::pair(signal.value(a) >= on ? a : root(signal, on, a, b), true);
+    if (end <= off) return std::pair(signal.value(a) <= off ? a : root(signal, off, a, b), false);
+    return std::nullopt;
+  };
+  const double turn = signal.turn();
+  if (turn > low && turn < high)
+    if (const auto found = crossing(low, turn)) return found;
+  return crossing(turn > low && turn < high ? turn : low, high);
+}
+
+}  // namespace
+
+EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::uint64_t seed)
+    : size_(size),
+      config_(config),
+      seed_(seed),
+      limited_(config.bandwidth_hz_per_cd_m2 > 0),
+      dark_(static_cast<float>(config.dark_cd_m2)),
+      leak_per_s_(config.leak_hz * config.threshold_on),
+      refractory_ns_(from_seconds(1e-6 * config.refractory_us)),
+      pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)) {
+  EVPOSE_CHECK(config.dark_cd_m2 > 0 && config.threshold_on > 0 && config.threshold_off > 0);
+  if (limited_) {
+    tau_fast_s_ = 0.5 / (std::numbers::pi * config.bandwidth_max_hz);
+    tau_dim_s_ = 0.5 / (std::numbers::pi * config.bandwidth_hz_per_cd_m2);
+  }
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    Pixel& p = pixels_[i];
+    p.random = Random(seed, i);
+    const auto threshold = [&](double mean) {
+      return static_cast<float>(std::max(kLeastThreshold, mean + config.threshold_sigma * p.random.normal()));
+    };
+    p.on = threshold(config.threshold_on);
+    p.off = threshold(config.threshold_off);
+  }
+}
+
+void EventPixels::start(std::size_t pixel, TimeNs t, float luminance_cd_m2) {
+  Pixel& p = pixels_[pixel];
+  const double level = std::max(0.0F, luminance_cd_m2) + dark_;
+  p.filtered = std::log(level);
+  p.log_last = static_cast<float>(p.filtered);
+  draw_next_noise(pixel, t);
+  // Anywhere between "about to fire off" and "about to fire on".
+  const double share = config_.start_spread * p.random.uniform(-1, 1);
+  set_reference(p, p.filtered, t);
+  const double offset = share * (share < 0 ? p.on : p.off);
+  p.reference += offset;
+  p.log_leak += static_cast<float>(0.5 * offset);
+  set_bounds(p, t);
+}
+
+double EventPixels::hot_rate_hz(std::size_t pixel) const {
+  Random random(seed_, kHotStream + pixel);
+  if (random.uniform() >= config_.hot_share) return 0;
+  return config_.hot_min_hz * std::pow(config_.hot_max_hz / config_.hot_min_hz, random.uniform());
+}
+
+void EventPixels::draw_next_noise(std::size_t pixel, TimeNs t) {
+  Pixel& p = pixels_[pixel];
+  const double rate_hz =
+      std::max(config_.shot_noise_dark_hz, config_.shot_noise_bright_hz) + hot_rate_hz(pixel);
+  // Further off than any recording is long: never.
+  constexpr double kLongest_s = 1e9;
+  const double wait_s = rate_hz > 0 ? p.random.exponential() / rate_hz : kLongest_s;
+  p.next_noise = wait_s < kLongest_s ? t + 1 + static_cast<TimeNs>(1e9 * wait_s) : kNever;
+}
+
+bool EventPixels::accept_noise(std::size_t pixel, double level, EventCause& cause) {
+  const double hot_hz = hot_rate_hz(pixel);
+  const double most_hz = std::max(config_.shot_noise_dark_hz, config_.shot_noise_bright_hz) + hot_hz;
+  const double shot_hz =
+      config_.shot_noise_bright_hz + (config_.shot_noise_dark_hz - config_.shot_noise_bright_hz) /
+                                         (1 + level / config_.shot_noise_half_cd_m2);
+  const double draw_hz = most_hz * pixels_[pixel].random.uniform();
+  cause = draw_hz < hot_hz ? EventCause::hot : EventCause::shot;
+  return draw_hz < hot_hz + shot_hz;
+}
+
+void EventPixels::set_reference(Pixel& p, double log_luminance, TimeNs t) const {
+  p.reference = log_luminance + leak_per_s_ * seconds(t);
+  p.log_leak = static_cast<float>(log_luminance + 0.5 * p.on);
+}
+
+void EventPixels::set_bounds(Pixel& p, TimeNs t) const {
+  p.wake = std::min(p.next_noise, t + kHorizon);
+  double high = p.reference + p.on - leak_per_s_ * seconds(p.wake) - kSlack;
+  double low = p.reference - p.off - leak_per_s_ * seconds(t) + kSlack;
+  if (!limited_) high = std::exp(high), low = std::exp(low);
+  p.high = static_cast<float>(high);
+  p.low = static_cast<float>(low);
+}
+
+void EventPixels::fire(std::size_t pixel, TimeNs t, bool on, EventCause cause,
+                       std::vector<SimEvent>& events) const {
+  SimEvent event;
+  event.t = t;
+  const auto width = static_cast<std::size_t>(size_.width);
+  event.x = static_cast<std::uint16_t>(pixel % width);
+  event.y = static_cast<std::uint16_t>(pixel / width);
+  event.on = on;
+  event.cause = cause;
+  events.push_back(event);
+}
+
+template <class Signal>
+void EventPixels::walk(std::size_t pixel, TimeNs t0, TimeNs t1, const Signal& signal,
+                       std::vector<SimEvent>& events) {
+  Pixel& p = pixels_[pixel];
+  const auto since = [&](TimeNs t) { return static_cast<double>(t - t0); };
+  TimeNs now = t0;
+  while (true) {
+    if (p.high == kInfinity) {  // in reset: the reference follows the signal until its end
+      if (p.wake > t1) return;
+      now = std::max(now, p.wake);
+      set_reference(p, signal.log_luminance(since(now)), now);
+      p.high = p.low = 0;
+    }
+    while (p.next_noise < now) draw_next_noise(pixel, p.next_noise);  // what fell into a reset is lost
+    const auto crossing =
+        first_crossing(signal, since(now), since(t1), p.reference + p.on, p.reference - p.off);
+    const TimeNs t_crossing =
+        crossing ? std::clamp(t0 + static_cast<TimeNs>(std::ceil(crossing->first)), t0 + 1, t1) : kNever;
+    if (std::min(t_crossing, p.next_noise) > t1) break;
+    if (p.next_noise <= t_crossing) {
+      now = p.next_noise;
+      draw_next_noise(pixel, now);
+      EventCause cause{};
+      if (!accept_noise(pixel, signal.level(since(now)), cause)) continue;
+      fire(pixel, now, (p.random.bits() & 1) != 0, cause, events);
+      set_reference(p, signal.log_luminance(since(now)), now);
+    } else {
+      now = t_crossing;
+      const bool on = crossing->second;
+      const double log_luminance = signal.log_luminance(since(now));
+      const bool leaked = on && log_luminance < p.log_leak;
+      fire(pixel, now, on, leaked ? EventCause::leak : EventCause::signal, events);
+      p.reference += on ? p.on : -p.off;
+      p.log_leak = static_cast<float>(log_luminance + 0.5 * p.on);
+    }
+    if (refractory_ns_ > 0) {
+      p.low = -kInfinity;
+      p.high = kInfinity;
+      p.wake = now + refractory_ns_;
+    }
+  }
+  set_bounds(p, t1);
+}
+
+void EventPixels::advance_unlimited(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
+  const double from = std::max(0.0, span.from) + dark_, to = std::max(0.0, span.to) + dark_;
+  const Ramp ramp(from, to, static_cast<double>(span.t1 - span.t0), leak_per_s_ * seconds(span.t0),
+                  1e-9 * leak_per_s_);
+  walk(pixel, span.t0, span.t1, ramp, events);
+}
+
+void EventPixels::advance_limited(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
+  Pixel& p = pixels_[pixel];
+  const double from = std::max(0.0, span.from) + dark_, to = std::max(0.0, span.to) + dark_;
+  const double change = std::log(to / from);
+  const int steps = 1 + static_cast<int>(std::abs(change) / kSmallChange);
+  double level = from;
+  TimeNs t = span.t0;
+  for (int i = 1; i <= steps; ++i) {
+    const double next = i == steps ? to : from * std::exp(change * i / steps);
+    const TimeNs t_next = i == steps ? span.t1
+                                     : span.t0 + static_cast<TimeNs>(static_cast<double>(span.t1 - span.t0) *
+                                                                     (next - from) / (to - from));
+    if (t_next > t) {
+      const double mean = 0.5 * (level + next), length_ns = static_cast<double>(t_next - t);
+      const double log_next = std::log(next);
+      const Response response(
+          {p.log_last, log_next, mean, p.filtered, length_ns, 1e9 * time_constant_s(mean)},
+          leak_per_s_ * seconds(t), 1e-9 * leak_per_s_);
+      walk(pixel, t, t_next, response, events);
+      p.filtered = response.log_luminance(length_ns);
+      p.log_last = static_cast<float>(log_next);
+    }
+    level = next;
+    t = t_next;
+  }
+}
+
+}  // namespace evpose::sim

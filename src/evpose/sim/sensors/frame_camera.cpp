@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/sensors/frame_camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/core/config.h"
+#include "evpose/core/parallel.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/files/new_folder.h"
+#include "evpose/io/files/png_file.h"
+
+namespace evpose::sim {
+namespace {
+
+std::string file_name(int number) {
+  const std::string digits = std::to_string(number);
+  return std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits + ".png";
+}
+
+}  // namespace
+
+std::uint8_t grey_value(double luminance, double white, double range_db) {
+  constexpr double kGamma = 1 / 2.2;
+  const double black = white * std::pow(10, -range_db / 20);
+  if (!(luminance > black)) return 0;
+  return static_cast<std::uint8_t>(std::lround(255 * std::pow(std::min(luminance / white, 1.0), kGamma)));
+}
+
+Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, ImageSize size, const FramesConfig& config,
+                                          TimeNs end) {
+  if (config.rate_hz > 0) {
+    if (config.exposure_ms * 1e-3 * config.rate_hz > 1)
+      return Error{"frames.exposure_ms",
+                   text(config.exposure_ms, " ms do not fit between pictures at ", config.rate_hz, " Hz"),
+                   "shorten the exposure or lower frames.rate_hz"};
+    if (Status made = folder.make_folder("frames"); !made) return made.error();
+  }
+  return FrameCamera(folder, size, config, end);
+}
+
+std::vector<Exposure*> FrameCamera::exposures(TimeNs t0, TimeNs t1) {
+  if (config_.rate_hz > 0) {
+    while (true) {
+      const TimeNs open = from_seconds(begun_ / config_.rate_hz),
+                   close = open + from_seconds(1e-3 * config_.exposure_ms);
+      if (open > t1 || close > end_) break;
+      open_.push_back(
+          {open, close, std::vector<float>(static_cast<std::size_t>(size_.width) * size_.height)});
+      ++begun_;
+    }
+  }
+  std::vector<Exposure*> out;
+  for (Exposure& exposure : open_) {
+    if (exposure.open <= t1 && exposure.close >= t0) out.push_back(&exposure);
+  }
+  return out;
+}
+
+Status FrameCamera::develop(TimeNs t) {
+  while (!open_.empty() && open_.front().close <= t) {
+    const Exposure& exposure = open_.front();
+    const double length_s = to_seconds(exposure.close - exposure.open);
+    if (!(white_ > 0)) {
+      constexpr double kWhiteOverMedian = 6;
+      std::vector<float> sorted = exposure.sum;
+      const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+      std::nth_element(sorted.begin(), middle, sorted.end());
+      white_ = std::max(1e-6, kWhiteOverMedian * *middle / length_s);
+    }
+    std::vector<std::uint8_t> grey(exposure.sum.size());
+    for (std::size_t i = 0; i < grey.size(); ++i)
+      grey[i] = grey_value(exposure.sum[i] / length_s, white_, config_.range_db);
+    const std::string name = file_name(written_++);
+    if (Status done = write_png_grey8(folder_->path("frames/" + name), size_.width, size_.height, grey);
+        !done)
+      return done;
+    stamps_ +=
+        text((exposure.open + exposure.close) / 2, ",", name, ",", exposure.close - exposure.open, "\n");
+    open_.pop_front();
+  }
+  return {};
+}
+
+Status FrameCamera::finish() {
+  if (!(config_.rate_hz > 0)) return {};
+  return write_text_file(folder_->path("frames/timestamps.csv"),
+                         "#timestamp_ns,filename,exposure_ns\n" + stamps_);
+}
+
+Status write_depth(const NewFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
+                   ImageSize size, const std::function<Pose(double t_s)>& T_map_cam,
+                   const DepthConfig& config, TimeNs end, ThreadPool& pool) {
+  if (!(config.rate_hz > 0)) return {};
+  if (Status made = folder.make_folder("depth"); !made) return made;
+  std::string stamps = "#timestamp_ns,filename\n";
+  std::vector<std::uint16_t> depth_mm(rays.size());
+  for (int k = 0; from_seconds(k / config.rate_hz) <= end; ++k) {
+    const TimeNs t = from_seconds(k / config.rate_hz);
+    const Pose pose = T_map_cam(to_seconds(t));
+    const std::vector<Pose> parts = stage.rays.parts_at(to_seconds(t));
+    pool.for_chunks(rays.size(), 4096, [&](std::size_t, std::size_t begin, std::size_t stop) {
+      for (std::size_t i = begin; i < stop; ++i) {
+        const auto hit = stage.rays.trace(parts, pose.p, pose.q * rays[i].direction().cast<double>());
+        const double mm = hit ? 1e3 * hit->distance : 0;  // rays have z = 1
+        depth_mm[i] = mm < 65535 ? static_cast<std::uint16_t>(std::lround(mm)) : std::uint16_t{0};
+      }
+    });
+    const std::string name = file_name(k);
+    if (Status done = write_png_grey16(folder.path("depth/" + name), size.width, size.height, depth_mm);
+        !done)
+      return done;
+    stamps += text(t, ",", name, "\n");
+  }
+  return write_text_file(folder.path("depth/timestamps.csv"), stamps);
+}
+
+void describe(ConfigTable& table, FramesConfig& c) {
+  table.add("rate_hz", c.rate_hz, "Hz", "grey pictures; 0: none", {0, 1000});
+  table.add("exposure_ms", c.exposure_ms, "ms", "mean of the luminance over so long", {0.01, 1000});
+  table.add("white_cd_m2", c.white_cd_m2, "cd/m^2",
+            "shown as white; 0: six times the median of the first picture", {0, 1e9});
+  table.add("range_db", c.range_db, "dB", "what is darker than white by so much is black", {10, 140});
+}
+
+void describe(ConfigTable& table, DepthConfig& c) {
+  table.add("rate_hz", c.rate_hz, "Hz", "depth pictures; 0: none", {0, 1000});
+}
+
+}  // namespace evpose::sim

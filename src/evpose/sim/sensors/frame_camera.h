@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <list>
+#include <string>
+#include <vector>
+
+#include "evpose/core/error.h"
+#include "evpose/sim/sensors/film.h"
+
+namespace evpose {
+class NewFolder;
+}
+
+namespace evpose::sim {
+
+/// Grey pictures beside the events, through the same lens.
+struct FramesConfig {
+  double rate_hz = 0;      ///< 0: none
+  double exposure_ms = 8;  ///< mean of the luminance over so long
+  double white_cd_m2 = 0;  ///< shown as white; 0: six times the median of the first picture
+  double range_db = 60;    ///< what is darker than white by so much is black
+};
+void describe(ConfigTable& table, FramesConfig& config);
+
+/// Grey value of a mean luminance: a power law between black and white.
+std::uint8_t grey_value(double luminance, double white, double range_db);
+
+/// Writes frames/NNNNNN.png and frames/timestamps.csv. A picture's time is the middle of its exposure.
+class FrameCamera {
+ public:
+  /// Keeps a reference to the folder.
+  static Expected<FrameCamera> create(const NewFolder& folder, ImageSize size, const FramesConfig& config,
+                                      TimeNs end);
+
+  /// Exposures that are open at some time in [t0, t1].
+  std::vector<Exposure*> exposures(TimeNs t0, TimeNs t1);
+  /// Everything up to `t` is exposed: writes the pictures that are complete.
+  Status develop(TimeNs t);
+  Status finish();
+  int written() const { return written_; }
+
+ private:
+  FrameCamera(const NewFolder& folder, ImageSize size, const FramesConfig& config, TimeNs end)
+      : folder_(&folder), size_(size), config_(config), white_(config.white_cd_m2), end_(end) {}
+
+  const NewFolder* folder_;
+  ImageSize size_;
+  FramesConfig config_;
+  double white_;
+  TimeNs end_;
+  int begun_ = 0, written_ = 0;
+  std::list<Exposure> open_;
+  std::string stamps_;
+};
+
+/// Depth pictures: z of the pixels' centres, moving things included.
+struct DepthConfig {
+  double rate_hz = 0;  ///< 0: none
+};
+void describe(ConfigTable& table, DepthConfig& config);
+
+/// Writes depth/NNNNNN.png, 16 bits, millimetres, 0 beyond 65.5 m and where there is nothing, and
+/// depth/timestamps.csv.
+Status write_depth(const NewFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
+                   ImageSize size, const std::function<Pose(double t_s)>& T_map_cam,
+                   const DepthConfig& config, TimeNs end, ThreadPool& pool);
+
+}  // namespace evpose::sim

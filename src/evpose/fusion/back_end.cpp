@@ -98,16 +98,16 @@ Expected<PieceOffsets> settled(const FusionConfig& config, bool map_states_error
 
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,
                                        const Pose& T_body_cam) {
-  const Motion motion(model, config, noise);
+  const StatePropagator propagator(model, config, noise);
   switch (config.kind) {
     case BackEndKind::ekf:
       if (config.slow.piece_offset == PieceOffsets::on)
-        return std::make_unique<PieceEkf>(motion, config.slow);
-      return std::make_unique<Ekf>(motion, config.calibration, config.slow, T_body_cam);
+        return std::make_unique<PieceEkf>(propagator, config.slow);
+      return std::make_unique<Ekf>(propagator, config.calibration, config.slow, T_body_cam);
     case BackEndKind::graph:
-      return std::make_unique<Graph>(motion, config.window, config.coupling);
+      return std::make_unique<Graph>(propagator, config.window, config.coupling);
     case BackEndKind::particle:
-      return std::make_unique<ParticleFilter>(motion, config.particle);
+      return std::make_unique<ParticleFilter>(propagator, config.particle);
   }
   EVPOSE_CHECK(false);
   return nullptr;

@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "evpose/core/error.h"
-#include "evpose/fusion/motion.h"
 #include "evpose/fusion/state.h"
+#include "evpose/fusion/state_propagator.h"
 #include "evpose/imu/imu.h"
 
 namespace evpose {
@@ -110,14 +110,14 @@ void describe(ConfigTable& table, FusionConfig& config);
 /// What the tracker asks of a fusion framework. Time goes forward: start, then predict and update in turn.
 class BackEnd {
  public:
-  explicit BackEnd(const Motion& motion) : motion_(motion) {}
+  explicit BackEnd(const StatePropagator& propagator) : propagator_(propagator) {}
   virtual ~BackEnd() = default;
 
   /// Begins, or begins anew; what was found of the calibration is kept.
   virtual void start(const FusionState& first) = 0;
   /// With the configured uncertainty. `angular_rate_body` is used by constant velocity only.
   void start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) {
-    start(motion_.start(t, nav, angular_rate_body));
+    start(propagator_.initial_state(t, nav, angular_rate_body));
   }
   /// IMU model: one step between two samples; a.t must be the state's time. Both in the body frame.
   virtual void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) = 0;
@@ -128,20 +128,20 @@ class BackEnd {
   virtual void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) = 0;
   void update(const PoseInformation& measurement) { update(measurement, {}); }
   virtual bool takes_contours() const { return false; }
-  /// The newest state, with its covariance. A copy can be carried to any later time by motion().
+  /// The newest state, with its covariance. A copy can be carried to any later time by propagator().
   virtual const FusionState& state() const = 0;
 
   /// Of the pose that the next measurement will see: the state's, and that of the calibration.
   virtual Matrix6d measured_covariance() const { return state().pose_covariance(); }
   virtual Calibration calibration() const { return {}; }
 
-  const Motion& motion() const { return motion_; }
+  const StatePropagator& propagator() const { return propagator_; }
 
  protected:
-  void set_gravity_map(const Eigen::Vector3d& gravity) { motion_.set_gravity_map(gravity); }
+  void set_gravity_map(const Eigen::Vector3d& gravity) { propagator_.set_gravity_map(gravity); }
 
  private:
-  Motion motion_;
+  StatePropagator propagator_;
 };
 
 /// What `automatic` means for this map, and whether `on` can be had.

@@ -77,7 +77,7 @@ Found fly(const Wrong& wrong, const CalibrationConfig& calibration, const SlowEr
     return interpolate(readings[k], readings[k + 1], clock);
   };
 
-  Ekf ekf(Motion(MotionModel::imu, config, noise), calibration, slow, T_body_cam);
+  Ekf ekf(StatePropagator(MotionModel::imu, config, noise), calibration, slow, T_body_cam);
   const std::size_t first = 20;
   ekf.start(static_cast<TimeNs>(first) * kStep, truth[first], {0, 0, 0});
   if (wrong.seen_anew) {
@@ -202,7 +202,7 @@ TEST(Calibration, TiltOfTheMapIsFound) {
 TEST(Calibration, WhatWasFoundOutlivesANewStart) {
   CalibrationConfig c;
   c.time_offset = true;
-  Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}), c);
+  Ekf ekf(StatePropagator(MotionModel::imu, FusionConfig{}, ImuNoise{}), c);
   NavState nav;
   nav.velocity = {1, 0, 0};
   ekf.start(0, nav, {0, 0, 0});
@@ -237,7 +237,7 @@ TEST(SlowErrors, ALastingOffsetMakesThePoseHonest) {
     double nees = 0;
     int count = 0;
     for (int run = 0; run < 6; ++run) {
-      Ekf ekf(Motion(MotionModel::imu, config, ImuNoise{}), {}, slow);
+      Ekf ekf(StatePropagator(MotionModel::imu, config, ImuNoise{}), {}, slow);
       ekf.start(0, {}, {0, 0, 0});
       Eigen::Vector3d offset = draw(random, 2e-3);
       const double keep = std::exp(-to_seconds(kStep) / slow.offset_s);

@@ -34,9 +34,9 @@ void correct(FusionState& state, const PoseInformation& m) {
   symmetrise(state.covariance);
 }
 
-Ekf::Ekf(const Motion& motion, const CalibrationConfig& calibration, const SlowErrorsConfig& slow,
-         const Pose& T_body_cam)
-    : BackEnd(motion), config_(calibration), slow_config_(slow), T_body_cam_(T_body_cam) {
+Ekf::Ekf(const StatePropagator& propagator, const CalibrationConfig& calibration,
+         const SlowErrorsConfig& slow, const Pose& T_body_cam)
+    : BackEnd(propagator), config_(calibration), slow_config_(slow), T_body_cam_(T_body_cam) {
   slow_ = config_.time_offset || config_.rotation || config_.translation || slow.gravity || slow.pose_offset;
 }
 
@@ -67,17 +67,17 @@ void Ekf::start(const FusionState& first) {
 }
 
 void Ekf::predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) {
-  if (!slow_) return motion().step(state_, a, b, trust);
+  if (!slow_) return propagator().propagate(state_, a, b, trust);
   Matrix15d F;
-  motion().step(state_, a, b, trust, &F);
+  propagator().propagate(state_, a, b, trust, &F);
   carry(F, to_seconds(b.t - a.t));
 }
 
 void Ekf::predict(TimeNs t) {
-  if (!slow_) return motion().step(state_, t);
+  if (!slow_) return propagator().propagate(state_, t);
   Matrix15d F;
   const double dt_s = to_seconds(t - state_.t);
-  motion().step(state_, t, &F);
+  propagator().propagate(state_, t, &F);
   carry(F, dt_s);
 }
 
@@ -86,7 +86,7 @@ void Ekf::carry(const Matrix15d& F, double dt) {
   cross_ = (F * cross_).eval();
   if (slow_config_.gravity) {
     Matrix15d pushed = Matrix15d::Zero();  // the state by the slow errors
-    const Eigen::Matrix3d by_turn = -so3::hat(motion().gravity_map());
+    const Eigen::Matrix3d by_turn = -so3::hat(propagator().gravity_map());
     pushed.block<3, 2>(error_state::kV, kTilt) = dt * by_turn.leftCols<2>();
     pushed.block<3, 2>(error_state::kP, kTilt) = 0.5 * dt * dt * by_turn.leftCols<2>();
     const Matrix15d mixed = cross_ * pushed.transpose();
@@ -151,7 +151,7 @@ void Ekf::apply(const Vector15d& d) {
   if (!slow_config_.gravity) return;
   calibration_.gravity_tilt_rad += d.segment<2>(kTilt);
   const Eigen::Vector3d turn(d(kTilt), d(kTilt + 1), 0);
-  set_gravity_map(so3::exp(turn) * motion().gravity_map());
+  set_gravity_map(so3::exp(turn) * propagator().gravity_map());
 }
 
 void Ekf::update(const PoseInformation& measurement, std::span<const ContourOffset>) {

@@ -15,7 +15,7 @@ void correct(FusionState& state, const PoseInformation& measurement);
 /// considered, not estimated: its uncertainty counts, its values stay (Schmidt).
 class Ekf : public BackEnd {
  public:
-  explicit Ekf(const Motion& motion, const CalibrationConfig& calibration = {},
+  explicit Ekf(const StatePropagator& propagator, const CalibrationConfig& calibration = {},
                const SlowErrorsConfig& slow = {}, const Pose& T_body_cam = {});
 
   using BackEnd::start;

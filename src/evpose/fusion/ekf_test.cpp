@@ -49,7 +49,7 @@ TEST(Ekf, CovarianceGrowsAsDifferencesOfTheStrapdownSay) {
     const double h = 1e-5;
     F.block<9, 1>(0, i) = (error(perturbed_run(i, h), plain) - error(perturbed_run(i, -h), plain)) / (2 * h);
   }
-  Ekf ekf(Motion(MotionModel::imu, config, silent));
+  Ekf ekf(StatePropagator(MotionModel::imu, config, silent));
   ekf.start(0, some_state(), {0, 0, 0});
   const Matrix15d P = ekf.state().covariance;
   ekf.predict(a, b, ImuTrust::good);
@@ -68,7 +68,7 @@ TEST(Ekf, PredictedCovarianceIsThatOfManyNoisyRuns) {
   FusionConfig config;
   config.imu_noise_scale = 1;
   config.imu_scale_sigma = 0;
-  Ekf ekf(Motion(MotionModel::imu, config, noise));
+  Ekf ekf(StatePropagator(MotionModel::imu, config, noise));
   ekf.start(0, some_state(), {0, 0, 0});
   const int steps = 200, runs = 1500;
   const TimeNs dt = kNsPerMs;
@@ -117,7 +117,7 @@ PoseInformation full_measurement(const Vector6d& offset) {
 }
 
 TEST(Ekf, UpdateIsTheTextbookKalmanUpdate) {
-  Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}));
+  Ekf ekf(StatePropagator(MotionModel::imu, FusionConfig{}, ImuNoise{}));
   ekf.start(0, some_state(), {0, 0, 0});
   for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), ImuTrust::good);
   const FusionState before = ekf.state();
@@ -139,7 +139,7 @@ TEST(Ekf, UpdateIsTheTextbookKalmanUpdate) {
 }
 
 TEST(Ekf, SingularMeasurementLeavesTheOtherDirectionsAlone) {
-  Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}));
+  Ekf ekf(StatePropagator(MotionModel::imu, FusionConfig{}, ImuNoise{}));
   ekf.start(0, some_state(), {0, 0, 0});
   PoseInformation m;
   m.information(0, 0) = 1e8;
@@ -152,7 +152,7 @@ TEST(Ekf, SingularMeasurementLeavesTheOtherDirectionsAlone) {
 }
 
 TEST(Ekf, EmptyMeasurementChangesNothing) {
-  Ekf ekf(Motion(MotionModel::imu, FusionConfig{}, ImuNoise{}));
+  Ekf ekf(StatePropagator(MotionModel::imu, FusionConfig{}, ImuNoise{}));
   ekf.start(0, some_state(), {0, 0, 0});
   const Matrix15d before = ekf.state().covariance;
   EXPECT_EQ(innovation(ekf.state().pose_covariance(), {}), 0);
@@ -161,7 +161,7 @@ TEST(Ekf, EmptyMeasurementChangesNothing) {
 }
 
 TEST(Ekf, ConstantVelocityLearnsTwistFromPosesAlone) {
-  Ekf ekf(Motion(MotionModel::constant_velocity, FusionConfig{}, ImuNoise{}));
+  Ekf ekf(StatePropagator(MotionModel::constant_velocity, FusionConfig{}, ImuNoise{}));
   NavState nav;
   const Eigen::Vector3d velocity(0.5, 0, 0.1), rate(0, 0.3, 0.2);
   ekf.start(0, nav, {0, 0, 0});

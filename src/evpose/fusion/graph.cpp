@@ -15,11 +15,11 @@ void describe(ConfigTable& table, WindowConfig& c) {
   table.add("delay", c.delay, "", "updates after which a result of the background is used", {1, 1000});
 }
 
-Graph::Graph(const Motion& motion, const WindowConfig& config, Coupling coupling)
-    : BackEnd(motion),
+Graph::Graph(const StatePropagator& propagator, const WindowConfig& config, Coupling coupling)
+    : BackEnd(propagator),
       config_(config),
       coupling_(coupling),
-      window_(motion.gravity_map()),
+      window_(propagator.gravity_map()),
       since_({0, 0, 0}, {0, 0, 0}) {}
 
 void Graph::start(const FusionState& first) {
@@ -44,13 +44,13 @@ void Graph::predict(TimeNs t) {
 }
 
 void Graph::carry(const Step& s) {
-  if (motion().model() == MotionModel::constant_velocity) {
-    since_.add(s.a, s.b, motion().noise());
-    return motion().step(state_, s.b.t);
+  if (propagator().model() == MotionModel::constant_velocity) {
+    since_.add(s.a, s.b, propagator().noise());
+    return propagator().propagate(state_, s.b.t);
   }
   since_.add(s.a, s.b,
-             motion().noise_at(0.5 * (s.a.gyro + s.b.gyro), 0.5 * (s.a.accel + s.b.accel), s.trust));
-  motion().step(state_, s.a, s.b, s.trust);
+             propagator().noise_at(0.5 * (s.a.gyro + s.b.gyro), 0.5 * (s.a.accel + s.b.accel), s.trust));
+  propagator().propagate(state_, s.a, s.b, s.trust);
 }
 
 /// A measurement for the newest state, and for the window.

@@ -16,7 +16,7 @@ namespace evpose {
 /// since is then done again from its result.
 class Graph : public BackEnd {
  public:
-  Graph(const Motion& motion, const WindowConfig& config, Coupling coupling = Coupling::loose);
+  Graph(const StatePropagator& propagator, const WindowConfig& config, Coupling coupling = Coupling::loose);
 
   using BackEnd::start;
   using BackEnd::update;

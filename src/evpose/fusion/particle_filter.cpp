@@ -13,8 +13,10 @@ void describe(ConfigTable& table, ParticleConfig& c) {
   table.add("particles", c.particles, "", "number of particles", {20, 1e6});
 }
 
-ParticleFilter::ParticleFilter(const Motion& motion, const ParticleConfig& config)
-    : BackEnd(motion), sample_(6, config.particles), weights_(static_cast<std::size_t>(config.particles)) {}
+ParticleFilter::ParticleFilter(const StatePropagator& propagator, const ParticleConfig& config)
+    : BackEnd(propagator),
+      sample_(6, config.particles),
+      weights_(static_cast<std::size_t>(config.particles)) {}
 
 void ParticleFilter::start(const FusionState& first) {
   random_.seed(1);

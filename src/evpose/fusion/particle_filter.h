@@ -16,14 +16,14 @@ namespace evpose {
 /// random numbers are the same in every run.
 class ParticleFilter : public BackEnd {
  public:
-  ParticleFilter(const Motion& motion, const ParticleConfig& config);
+  ParticleFilter(const StatePropagator& propagator, const ParticleConfig& config);
 
   using BackEnd::start;
   void start(const FusionState& first) override;
   void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override {
-    motion().step(state_, a, b, trust);
+    propagator().propagate(state_, a, b, trust);
   }
-  void predict(TimeNs t) override { motion().step(state_, t); }
+  void predict(TimeNs t) override { propagator().propagate(state_, t); }
   using BackEnd::update;
   void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
   const FusionState& state() const override { return state_; }

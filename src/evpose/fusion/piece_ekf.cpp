@@ -8,7 +8,8 @@
 
 namespace evpose {
 
-PieceEkf::PieceEkf(const Motion& motion, const SlowErrorsConfig& config) : BackEnd(motion), config_(config) {}
+PieceEkf::PieceEkf(const StatePropagator& propagator, const SlowErrorsConfig& config)
+    : BackEnd(propagator), config_(config) {}
 
 void PieceEkf::start(const FusionState& first) {
   state_ = first;
@@ -20,13 +21,13 @@ void PieceEkf::start(const FusionState& first) {
 
 void PieceEkf::predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) {
   Matrix15d F;
-  motion().step(state_, a, b, trust, &F);
+  propagator().propagate(state_, a, b, trust, &F);
   cross_ = (F * cross_).eval();
 }
 
 void PieceEkf::predict(TimeNs t) {
   Matrix15d F;
-  motion().step(state_, t, &F);
+  propagator().propagate(state_, t, &F);
   cross_ = (F * cross_).eval();
 }
 

@@ -14,7 +14,7 @@ namespace evpose {
 /// one not seen for longest gives way, and what finds no state counts without an offset.
 class PieceEkf : public BackEnd {
  public:
-  PieceEkf(const Motion& motion, const SlowErrorsConfig& config);
+  PieceEkf(const StatePropagator& propagator, const SlowErrorsConfig& config);
 
   using BackEnd::start;
   using BackEnd::update;

@@ -24,7 +24,7 @@ FusionConfig some_config(int most_pieces = 100) {
   return config;
 }
 
-Motion some_motion() { return {MotionModel::imu, some_config(), ImuNoise{}}; }
+StatePropagator some_propagator() { return {MotionModel::imu, some_config(), ImuNoise{}}; }
 
 NavState some_state() {
   NavState s;
@@ -61,7 +61,7 @@ void measure(BackEnd& filter, const std::vector<ContourOffset>& contours) {
 
 TEST(PieceEkf, RepeatedMeasurementsGiveTheBatchSolutionOverPoseAndOffsets) {
   constexpr int kPieces = 9, kUpdates = 5;
-  PieceEkf filter(some_motion(), some_config().slow);
+  PieceEkf filter(some_propagator(), some_config().slow);
   filter.start(0, some_state(), {0, 0, 0});
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
@@ -110,10 +110,10 @@ TEST(PieceEkf, KnowsThatAMapWithPiecesOffNeverTellsMoreThanThePiecesAllow) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   double own = 0, plain = 0;
-  const Motion motion = some_motion();
+  const StatePropagator propagator = some_propagator();
   for (int run = 0; run < kRuns; ++run) {
-    PieceEkf with(motion, some_config().slow);
-    Ekf without(motion);
+    PieceEkf with(propagator, some_config().slow);
+    Ekf without(propagator);
     NavState start = some_state();
     Vector6d off;
     for (int i = 0; i < 6; ++i) off(i) = normal(random) * (i < 3 ? kStartSigma_m : kStartSigma_rad);
@@ -144,7 +144,7 @@ TEST(PieceEkf, KnowsThatAMapWithPiecesOffNeverTellsMoreThanThePiecesAllow) {
 }
 
 TEST(PieceEkf, ThePieceNotSeenForLongestGivesWay) {
-  PieceEkf filter(some_motion(), some_config(2).slow);
+  PieceEkf filter(some_propagator(), some_config(2).slow);
   filter.start(0, some_state(), {0, 0, 0});
   const auto contours = some_contours(3);
   const auto numbers = [&] {

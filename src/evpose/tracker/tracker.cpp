@@ -116,7 +116,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
       relocalizer_(config.relocalization, index_, pieces_, *setup_.camera, setup_.T_body_cam,
-                   fusion_->motion().gravity_map()),
+                   fusion_->propagator().gravity_map()),
       health_(config.health),
       imu_watch_(config.imu),
       agreement_(config.agreement),
@@ -215,9 +215,9 @@ void Tracker::tell_states() {
     if (update_number_ > 0 && next.sample.t > ahead_.t) {
       const TimeNs t = fusion_->state().t;
       const bool held = agreement_.distrusted(t);
-      fusion_->motion().step(ahead_, held ? held_reading(told_.t, ahead_) : told_,
-                             held ? held_reading(next.sample.t, ahead_) : next.sample,
-                             trust_in(next, next, t));
+      fusion_->propagator().propagate(ahead_, held ? held_reading(told_.t, ahead_) : told_,
+                                      held ? held_reading(next.sample.t, ahead_) : next.sample,
+                                      trust_in(next, next, t));
       told_ = next.sample;
       state_callback_(ahead_);
     }
@@ -229,7 +229,7 @@ void Tracker::tell_states() {
 /// for the rate that a held reading does not know; afterwards both biases are what they were.
 bool Tracker::bridge_silence(TimeNs until) {
   if (setup_.motion != MotionModel::imu) return false;
-  const bool silent = bridge(imu_, until, fusion_->state(), fusion_->motion().gravity_map());
+  const bool silent = bridge(imu_, until, fusion_->state(), fusion_->propagator().gravity_map());
   const bool blind = silent || agreement_.distrusted(until);
   if (blind && !blind_) {
     before_blind_ = fusion_->state();
@@ -260,7 +260,7 @@ FusionState Tracker::with_imu_biases() const {
 /// A reading of a body that keeps its velocity and its rate, in place of one that is wrong.
 ImuSample Tracker::held_reading(TimeNs t, const FusionState& state) const {
   return {t, held_gyro_,
-          state.accel_bias - state.nav.T_map_body.q.conjugate() * fusion_->motion().gravity_map()};
+          state.accel_bias - state.nav.T_map_body.q.conjugate() * fusion_->propagator().gravity_map()};
 }
 
 ImuTrust Tracker::trust_in(const CheckedImu& a, const CheckedImu& b, TimeNs t) const {
@@ -291,8 +291,8 @@ void Tracker::predict(TimeNs t) {
     const ImuTrust reading = a.missing || b.missing   ? ImuTrust::none
                              : a.suspect || b.suspect ? ImuTrust::suspect
                                                       : ImuTrust::good;
-    agreement_.step(a.sample, b.sample, with_imu_biases(), fusion_->motion().gravity_map(),
-                    fusion_->motion().noise_at(b.sample.gyro, b.sample.accel, reading));
+    agreement_.step(a.sample, b.sample, with_imu_biases(), fusion_->propagator().gravity_map(),
+                    fusion_->propagator().noise_at(b.sample.gyro, b.sample.accel, reading));
     if (relocalizer_.searching() || verify_until_ != 0)
       moved_ = joined(moved_, integrate(a.sample, b.sample, state.gyro_bias, state.accel_bias));
     if (agreement_.distrusted(t))
@@ -340,7 +340,8 @@ void Tracker::search(TimeNs t) {
   const auto found =
       relocalizer_.process(t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate);
   if (!found) return;
-  FusionState state = fusion_->motion().start(fusion_->state().t, found->nav, found->angular_rate);
+  FusionState state =
+      fusion_->propagator().initial_state(fusion_->state().t, found->nav, found->angular_rate);
   state.gyro_bias = fusion_->state().gyro_bias;
   state.accel_bias = fusion_->state().accel_bias;
   if (setup_.motion == MotionModel::constant_velocity) state.gyro_bias = -found->angular_rate;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/fusion/motion.h"
+#include "evpose/fusion/state_propagator.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace evpose {
 
 using namespace error_state;
 
-Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
+StatePropagator::StatePropagator(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
     : model_(model),
       gravity_map_(c.gravity_map),
       noise_(noise),
@@ -46,7 +46,8 @@ Motion::Motion(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
   start_sigma_.segment<3>(kBa).setConstant(accel_sigma);
 }
 
-ImuNoise Motion::noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, ImuTrust trust) const {
+ImuNoise StatePropagator::noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
+                                   ImuTrust trust) const {
   ImuNoise out = noise(trust);
   if (model_ != MotionModel::imu) return out;
   // As white noise of the strength that an error which lasts so long has at low frequencies.
@@ -56,7 +57,8 @@ ImuNoise Motion::noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& fo
   return out;
 }
 
-FusionState Motion::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const {
+FusionState StatePropagator::initial_state(TimeNs t, const NavState& nav,
+                                           const Eigen::Vector3d& angular_rate_body) const {
   FusionState state;
   state.t = t;
   state.nav = nav;
@@ -66,8 +68,9 @@ FusionState Motion::start(TimeNs t, const NavState& nav, const Eigen::Vector3d& 
   return state;
 }
 
-void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-                    const Eigen::Vector3d& force, double dt, ImuTrust trust, Matrix15d* transition) const {
+void StatePropagator::propagate_covariance(FusionState& state, const NavState& before,
+                                           const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
+                                           double dt, ImuTrust trust, Matrix15d* transition) const {
   const Eigen::Quaterniond q_mid = before.T_map_body.q * so3::exp(0.5 * dt * rate);
   const Eigen::Matrix3d R = q_mid.toRotationMatrix();
   // The attitude error is in the body of the step's start; seen from its middle it has turned half the way.
@@ -90,20 +93,21 @@ void Motion::spread(FusionState& state, const NavState& before, const Eigen::Vec
   if (transition != nullptr) *transition = F;
 }
 
-void Motion::step(FusionState& state, const ImuSample& a, const ImuSample& b, ImuTrust trust,
-                  Matrix15d* transition) const {
+void StatePropagator::propagate(FusionState& state, const ImuSample& a, const ImuSample& b, ImuTrust trust,
+                                Matrix15d* transition) const {
   if (transition != nullptr) transition->setIdentity();
   EVPOSE_CHECK(model_ == MotionModel::imu && a.t == state.t && b.t >= a.t);
   if (b.t == a.t) return;
   const NavState before = state.nav;
   state.nav = strapdown(before, a, b, state.gyro_bias, state.accel_bias, gravity_map_);
   state.t = b.t;
-  spread(state, before, 0.5 * (a.gyro + b.gyro) - state.gyro_bias,
-         0.5 * (a.accel + b.accel) - state.accel_bias, to_seconds(b.t - a.t), trust, transition);
+  propagate_covariance(state, before, 0.5 * (a.gyro + b.gyro) - state.gyro_bias,
+                       0.5 * (a.accel + b.accel) - state.accel_bias, to_seconds(b.t - a.t), trust,
+                       transition);
   state.angular_rate = b.gyro - state.gyro_bias;
 }
 
-void Motion::step(FusionState& state, TimeNs t, Matrix15d* transition) const {
+void StatePropagator::propagate(FusionState& state, TimeNs t, Matrix15d* transition) const {
   if (transition != nullptr) transition->setIdentity();
   EVPOSE_CHECK(model_ == MotionModel::constant_velocity && t >= state.t);
   if (t == state.t) return;
@@ -113,7 +117,8 @@ void Motion::step(FusionState& state, TimeNs t, Matrix15d* transition) const {
   state.nav.T_map_body.q = (before.T_map_body.q * so3::exp(dt * state.angular_rate)).normalized();
   state.nav.T_map_body.p += dt * before.velocity;
   state.t = t;
-  spread(state, before, state.angular_rate, Eigen::Vector3d::Zero(), dt, ImuTrust::good, transition);
+  propagate_covariance(state, before, state.angular_rate, Eigen::Vector3d::Zero(), dt, ImuTrust::good,
+                       transition);
 }
 
 }  // namespace evpose

@@ -18,9 +18,9 @@ enum class ImuTrust {
 
 /// Carries a state and its covariance forward, by the IMU or by constant velocity (EV-Pose eq. 2). Without
 /// an IMU it is the same model on a gyroscope that reads zero: its "bias" is then minus the angular rate.
-class Motion {
+class StatePropagator {
  public:
-  Motion(MotionModel model, const FusionConfig& config, const ImuNoise& noise);
+  StatePropagator(MotionModel model, const FusionConfig& config, const ImuNoise& noise);
 
   MotionModel model() const { return model_; }
   /// In the map, m/s^2; zero where no accelerometer is to be freed of it.
@@ -34,18 +34,19 @@ class Motion {
   ImuNoise noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, ImuTrust trust) const;
 
   /// The state at the start, with its configured uncertainty. The rate is used by constant velocity only.
-  FusionState start(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const;
+  FusionState initial_state(TimeNs t, const NavState& nav, const Eigen::Vector3d& angular_rate_body) const;
 
   /// IMU model: one step between two samples in the body frame; a.t must be the state's time.
   /// `transition`: what becomes of the state's error.
-  void step(FusionState& state, const ImuSample& a, const ImuSample& b, ImuTrust trust = ImuTrust::good,
-            Matrix15d* transition = nullptr) const;
+  void propagate(FusionState& state, const ImuSample& a, const ImuSample& b, ImuTrust trust = ImuTrust::good,
+                 Matrix15d* transition = nullptr) const;
   /// Constant velocity: to time t >= the state's.
-  void step(FusionState& state, TimeNs t, Matrix15d* transition = nullptr) const;
+  void propagate(FusionState& state, TimeNs t, Matrix15d* transition = nullptr) const;
 
  private:
-  void spread(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
-              const Eigen::Vector3d& force, double dt_s, ImuTrust trust, Matrix15d* transition) const;
+  void propagate_covariance(FusionState& state, const NavState& before, const Eigen::Vector3d& rate,
+                            const Eigen::Vector3d& force, double dt_s, ImuTrust trust,
+                            Matrix15d* transition) const;
 
   MotionModel model_;
   Eigen::Vector3d gravity_map_;

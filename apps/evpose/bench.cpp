@@ -1,43 +1,141 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bench.h"
-
+// The command line of `evpose bench`; the experiments are in src/evpose/bench/experiments.
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <filesystem>
+#include <memory>
 
 #include "commands.h"
+#include "evpose/bench/experiments/calibration.h"
+#include "evpose/bench/experiments/event_origins.h"
+#include "evpose/bench/experiments/faults.h"
+#include "evpose/bench/experiments/relocalization.h"
+#include "evpose/bench/experiments/update_picture.h"
+#include "evpose/bench/experiments/variants.h"
 
 namespace evpose {
+namespace {
 
-std::vector<PeerRecording> peer_recordings(const std::string& folder) {
-  std::vector<PeerRecording> out;
-  if (std::error_code ignored; !std::filesystem::exists(folder + "/maps", ignored)) {
-    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-      const std::string path = entry.path().string();
-      if (std::filesystem::exists(path + "/contours.ply", ignored) &&
-          std::filesystem::exists(path + "/events.h5", ignored))
-        out.push_back({entry.path().filename().string(), path, path + "/contours.ply", path + "/mesh.ply"});
-    }
-    std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-    return out;
-  }
-  for (const char* name : {"room_spiral", "room_720p", "room_people", "room_hover", "courtyard_landing"}) {
-    const std::string scene = std::string(name).substr(0, std::string(name).find('_'));
-    out.push_back({name, folder + "/" + name, folder + "/maps/" + scene + "_contours.ply",
-                   folder + "/maps/" + scene + "_mesh.ply"});
-  }
-  return out;
+using Run = std::function<int()>;
+
+int exit_status(const Status& status) { return status ? 0 : bad_input(status.error()); }
+
+void add_settings(CLI::App& command, std::vector<std::string>& assignments) {
+  command.add_option("--set", assignments, "one setting, key=value")->allow_extra_args(false);
 }
 
+void add_selection(CLI::App& command, experiments::Selection& selection) {
+  command.add_option("folder", selection.folder, "folder with the recordings and maps")
+      ->capture_default_str();
+  command.add_option("--only", selection.only, "names of recordings")->delimiter(',');
+  add_settings(command, selection.assignments);
+}
+
+void add_variants(CLI::App& bench, Run& run, const char* name, const char* what,
+                  const std::vector<experiments::Variant>& variants) {
+  auto* command = bench.add_subcommand(name, what);
+  auto request = std::make_shared<experiments::VariantsRequest>();
+  add_selection(*command, request->selection);
+  command->add_option("--variant", request->begins, "how the names of variants begin that are wanted")
+      ->delimiter(',');
+  auto* own = command->add_option("--recording", request->own.folder,
+                                  "a recording with truth, instead of the folder's");
+  own->needs(command->add_option("--map", request->own.map, "map for --recording"));
+  command->add_option("--occluders", request->own.occluders, "mesh that hides contours, for --recording")
+      ->needs(own);
+  command->callback([=, &run, &variants] {
+    request->own.name = request->own.folder;
+    run = [=, &variants] { return exit_status(experiments::print_variants(variants, *request)); };
+  });
+}
+
+void add_calibration(CLI::App& bench, Run& run) {
+  auto* command =
+      bench.add_subcommand("calibration", "Time offset and camera pose found from a wrong calibration");
+  auto selection = std::make_shared<experiments::Selection>();
+  selection->only = {"room_people"};
+  add_selection(*command, *selection);
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_calibration(*selection)); }; });
+}
+
+void add_relocalization(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("relocalization", "Starts from wrong poses");
+  auto request = std::make_shared<experiments::RelocalizationRequest>();
+  add_selection(*command, request->selection);
+  command->add_option("--seeds", request->seeds, "starts for each recording and class")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", request->threads, "starts at a time")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_flag("!--no-imu", request->imu, "leave the IMU out");
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_relocalization(*request)); }; });
+}
+
+void add_event_origins(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("events", "Simulated recordings with the truth of each event");
+  auto request = std::make_shared<experiments::EventOriginsRequest>();
+  command->add_option("recordings", request->recordings, "folders made by `evpose simulate`")->required();
+  command->add_option("--from", request->from_s, "seconds of the run that are left out")
+      ->capture_default_str();
+  add_settings(*command, request->assignments);
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_event_origins(*request)); }; });
+}
+
+void add_faults(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("faults", "Replays with faults in the streams");
+  auto request = std::make_shared<experiments::FaultsRequest>();
+  add_selection(*command, request->selection);
+  command->add_option("--replays", request->replays, "number of replays")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", request->threads, "replays at a time")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_option("--seed", request->seed, "of all random numbers")->capture_default_str();
+  command->add_option("--fault", request->fault, "only the replays with this fault");
+  command->add_option("--number", request->numbers, "only the replays of these numbers")->delimiter(',');
+  command->add_flag("--each", request->each, "a line for each replay");
+  command->callback([=, &run] {
+    run = [=] {
+      const auto not_finite = experiments::print_faults(*request);
+      if (!not_finite) return bad_input(not_finite.error());
+      return *not_finite > 0 ? 1 : 0;
+    };
+  });
+}
+
+void add_picture(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand(
+      "picture", "Draw one update: its events over the contours, by what became of them");
+  auto request = std::make_shared<experiments::UpdatePictureRequest>();
+  auto crop = std::make_shared<std::vector<double>>();
+  command->add_option("recording", request->recording.folder, "a recording")->required();
+  command->add_option("--map", request->recording.map, "contour map")->required();
+  command->add_option("--occluders", request->recording.occluders, "mesh that hides contours");
+  command->add_option("--at", request->at_s, "seconds of the run")->capture_default_str();
+  command->add_option("--crop", *crop, "x y width height, px")->expected(4);
+  command->add_option("-o,--output", request->output, "SVG file")->required();
+  command->callback([=, &run] {
+    if (crop->size() == 4) request->crop = {(*crop)[0], (*crop)[1], (*crop)[2], (*crop)[3]};
+    run = [=] { return exit_status(experiments::draw_update(*request)); };
+  });
+}
+
+}  // namespace
+
 void add_bench(CLI::App& app, std::function<int()>& run) {
-  auto* bench = app.add_subcommand("bench", "Measure and print the tables of the documentation");
+  auto* bench = app.add_subcommand("bench", "Experiments on whole recordings: the tables of docs/results");
   bench->require_subcommand(1);
-  add_bench_fusion(*bench, run);
-  add_bench_calibration(*bench, run);
-  add_bench_capture(*bench, run);
-  add_bench_events(*bench, run);
-  add_bench_faults(*bench, run);
-  add_bench_picture(*bench, run);
+  add_variants(*bench, run, "fusion", "Back ends side by side", experiments::back_end_variants());
+  add_variants(*bench, run, "ablation", "What each module of the tracker brings",
+               experiments::ablation_variants());
+  add_calibration(*bench, run);
+  add_relocalization(*bench, run);
+  add_event_origins(*bench, run);
+  add_faults(*bench, run);
+  add_picture(*bench, run);
 }
 
 }  // namespace evpose

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "evpose/bench/scene.h"
+#include "evpose/bench/micro/scene.h"
 #include "evpose/event/event_front.h"
 
 namespace evpose::bench {

@@ -6,7 +6,7 @@
 #include "evpose/event/event.h"
 #include "evpose/run/track_recording.h"
 
-namespace evpose {
+namespace evpose::experiments {
 
 /// A recording in memory, to be tracked several times.
 struct Streams {
@@ -29,4 +29,4 @@ Excerpt excerpt(const Streams& streams, TimeNs begin, TimeNs end);
 /// The pose, velocity and rate that the truth has at a time inside it.
 StartState start_at(const std::vector<TimedPose>& truth, TimeNs t);
 
-}  // namespace evpose
+}  // namespace evpose::experiments

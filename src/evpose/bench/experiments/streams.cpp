@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bench_streams.h"
+#include "evpose/bench/experiments/streams.h"
 
 #include <algorithm>
 
 #include "evpose/io/recording/recording.h"
 
-namespace evpose {
+namespace evpose::experiments {
 
 Expected<Streams> load_streams(const TrackRequest& request, const RunConfig& config) {
   auto job = prepare(request, config);
@@ -73,4 +73,4 @@ StartState start_at(const std::vector<TimedPose>& truth, TimeNs t) {
   return out;
 }
 
-}  // namespace evpose
+}  // namespace evpose::experiments

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "evpose/bench/scene.h"
+#include "evpose/bench/micro/scene.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/tracker/tracker.h"
 

@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What becomes of the events of standing edges, of texture and of moving things, where the simulator knows.
-#include <CLI/CLI.hpp>
+#include "evpose/bench/experiments/event_origins.h"
+
 #include <array>
 #include <cstdio>
-#include <memory>
 
-#include "bench.h"
-#include "bench_streams.h"
-#include "commands.h"
-#include "evpose/io/files/config_yaml.h"
 #include "evpose/io/hdf5/hdf5_file.h"
 
-namespace evpose {
+namespace evpose::experiments {
 namespace {
 
 constexpr std::size_t kOrigins = 4, kVerdicts = 6;
@@ -39,33 +34,51 @@ Expected<std::vector<std::uint8_t>> read_origins(const std::string& path) {
   return std::move(columns[0]);
 }
 
-/// Events since `begin_s` of the run, by origin and verdict.
+/// The events of the packets, one after the other.
+class EventCursor {
+ public:
+  explicit EventCursor(const std::vector<EventPacket>& packets) : packets_(packets) { skip_empty(); }
+
+  bool ended() const { return packet_ == packets_.size(); }
+  const EventPacket& packet() const { return packets_[packet_]; }
+  const Event& event() const { return packet().events[at_]; }
+  std::size_t row() const { return row_; }  ///< in the recording
+  void next() {
+    ++row_;
+    if (++at_ < packet().events.size()) return;
+    at_ = 0;
+    ++packet_;
+    skip_empty();
+  }
+
+ private:
+  void skip_empty() {
+    while (packet_ < packets_.size() && packets_[packet_].empty()) ++packet_;
+  }
+
+  const std::vector<EventPacket>& packets_;
+  std::size_t packet_ = 0, at_ = 0, row_ = 0;
+};
+
+/// Events since `begin_s` of the run, by origin and verdict. Those with a verdict are found again among those
+/// of the recording, which come in the same order.
 Tally tally(const Streams& streams, const std::vector<std::uint8_t>& origins, double begin_s) {
   Tally out{};
   auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start);
   if (!tracker) return out;
-  std::size_t packet = 0, at = 0, row = 0;
-  const auto next = [&] {
-    ++row;
-    if (++at < streams.packets[packet].events.size()) return;
-    at = 0;
-    do ++packet;
-    while (packet < streams.packets.size() && streams.packets[packet].empty());
+  EventCursor cursor(streams.packets);
+  const auto at_cursor = [&](const FrontEvent& event) {
+    const Event& e = cursor.event();
+    return e.x == event.x && e.y == event.y && e.on == event.on &&
+           (*tracker)->events().stamp(cursor.packet().time(e)) == event.stamp_us;
   };
-  while (packet < streams.packets.size() && streams.packets[packet].empty()) ++packet;
   (*tracker)->on_verdicts([&](std::span<const FrontEvent> events, std::span<const EventVerdict> verdicts) {
     for (std::size_t k = 0; k < events.size(); ++k) {
-      for (; packet < streams.packets.size(); next()) {
-        const EventPacket& p = streams.packets[packet];
-        const Event& e = p.events[at];
-        if (e.x == events[k].x && e.y == events[k].y && e.on == events[k].on &&
-            (*tracker)->events().stamp(p.time(e)) == events[k].stamp_us)
-          break;
-      }
-      if (packet == streams.packets.size()) return;
-      const double since_s = to_seconds(streams.packets[packet].base - streams.job.start.t);
-      if (since_s >= begin_s) ++out[origins[row]][static_cast<std::size_t>(verdicts[k])];
-      next();
+      while (!cursor.ended() && !at_cursor(events[k])) cursor.next();
+      if (cursor.ended()) return;
+      const double since_s = to_seconds(cursor.packet().base - streams.job.start.t);
+      if (since_s >= begin_s) ++out[origins[cursor.row()]][static_cast<std::size_t>(verdicts[k])];
+      cursor.next();
     }
   });
   feed(streams.packets, streams.imu, **tracker);
@@ -106,50 +119,33 @@ void print(const std::string& name, const Tally& tally) {
   std::fflush(stdout);
 }
 
-struct EventsRequest {
-  std::vector<std::string> recordings, assignments;
-  double from_s = 0.3;
-};
-
-int bench_events(const EventsRequest& request) {
-  RunConfig config;
-  ConfigTable table;
-  describe(table, config);
-  for (const auto& assignment : request.assignments)
-    if (auto ok = apply_assignment(table, assignment); !ok) return bad_input(ok.error());
-  std::printf("Made by `evpose bench events`; do not edit.\n\n");
-  for (const std::string& folder : request.recordings) {
-    TrackRequest track;
-    track.recording = folder;
-    track.map = folder + "/contours.ply";
-    track.occluders = folder + "/mesh.ply";
-    auto streams = load_streams(track, config);
-    if (!streams) return bad_input(streams.error());
-    const std::string truth = folder + "/events_truth.h5";
-    const auto origins = read_origins(truth);
-    if (!origins) return bad_input(origins.error());
-    std::size_t events = 0;
-    for (const EventPacket& p : streams->packets) events += p.events.size();
-    if (events != origins->size())
-      return bad_input(
-          Error{truth, text(origins->size(), " rows for ", events, " events"), "make the recording again"});
-    const std::size_t slash = folder.find_last_of('/', folder.size() - 2);
-    print(slash == std::string::npos ? folder : folder.substr(slash + 1),
-          tally(*streams, *origins, request.from_s));
-  }
-  return 0;
+/// Rows of the truth must be those of the events.
+Expected<std::vector<std::uint8_t>> origins_of(const Streams& streams, const std::string& folder) {
+  const std::string path = folder + "/events_truth.h5";
+  auto origins = read_origins(path);
+  if (!origins) return origins;
+  std::size_t events = 0;
+  for (const EventPacket& p : streams.packets) events += p.events.size();
+  if (events != origins->size())
+    return Error{path, text(origins->size(), " rows for ", events, " events"), "make the recording again"};
+  return origins;
 }
 
 }  // namespace
 
-void add_bench_events(CLI::App& bench, std::function<int()>& run) {
-  auto* command = bench.add_subcommand("events", "Simulated recordings with the truth of each event");
-  auto request = std::make_shared<EventsRequest>();
-  command->add_option("recordings", request->recordings, "folders made by `evpose simulate`")->required();
-  command->add_option("--from", request->from_s, "seconds of the run that are left out")
-      ->capture_default_str();
-  command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
-  command->callback([=, &run] { run = [=] { return bench_events(*request); }; });
+Status print_event_origins(const EventOriginsRequest& request) {
+  const auto config = configure(request.assignments);
+  if (!config) return config.error();
+  for (const std::string& folder : request.recordings) {
+    const std::string name = folder.substr(folder.find_last_of('/', folder.size() - 2) + 1);
+    const auto streams =
+        load_streams(BenchRecording{name, folder, folder + "/contours.ply", folder + "/mesh.ply"}, *config);
+    if (!streams) return streams.error();
+    const auto origins = origins_of(*streams, folder);
+    if (!origins) return origins.error();
+    print(name, tally(*streams, *origins, request.from_s));
+  }
+  return {};
 }
 
-}  // namespace evpose
+}  // namespace evpose::experiments

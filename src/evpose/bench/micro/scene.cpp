@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/bench/scene.h"
+#include "evpose/bench/micro/scene.h"
 
 #include <algorithm>
 #include <random>

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "evpose/bench/experiments/recordings.h"
+
+namespace evpose::experiments {
+
+struct RelocalizationRequest {
+  Selection selection;
+  int seeds = 20;  ///< starts of each recording and class of errors
+  int threads = 2;
+  bool imu = true;
+};
+
+/// Starts from wrong poses anywhere in the recordings: is the pose found, how soon, and is a wrong one ever
+/// called tracking?
+Status print_relocalization(const RelocalizationRequest& request);
+
+}  // namespace evpose::experiments

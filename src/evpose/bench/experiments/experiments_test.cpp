@@ -11,7 +11,7 @@
 namespace evpose::experiments {
 namespace {
 
-constexpr TimeNs kBegin = kNsPerSec, kFrom = kBegin + 100 * kNsPerMs, kTo = kBegin + 200 * kNsPerMs;
+constexpr TimeNs kBegin = kNsPerS, kFrom = kBegin + 100 * kNsPerMs, kTo = kBegin + 200 * kNsPerMs;
 constexpr ImageSize kSize{64, 48};
 
 /// 300 ms at 1 kHz; no two samples are alike.

@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "evpose/camera/camera.h"
 #include "evpose/event/event.h"
 #include "evpose/imu/imu.h"
 

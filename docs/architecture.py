@@ -13,7 +13,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]evpose/([a-z_]+)/(?:([a-z0-9_]+)/)?', re.MULTILINE)
-WIDTH, HEIGHT, ROW, TOP = 1200, 730, 88, 30
+WIDTH, HEIGHT, ROW, TOP = 1200, 746, 80, 24
 
 # Module: row (0 is the lowest), left, width, what it does. Blue boxes are the embeddable part, yellow ones the roof.
 PLACES = {
@@ -34,22 +34,22 @@ PLACES = {
     "mavlink": (5, 915, 265, "frames, messages, link"),
     "run": (6, 290, 310, "a recording through the tracker"),
     "view": (6, 640, 265, "browser: server and pages"),
-    "bench": (6, 20, 240, "kernels and experiments, timed"),
-    "apps": (7, 290, 490, "the program: one file per command"),
-    "ros": (7, 800, 180, "ROS 1 node"),
-    "python": (7, 1000, 180, "Python module"),
+    "bench": (7, 20, 240, "what the figures are made with"),
+    "apps": (8, 290, 490, "the program: one file per command"),
+    "ros": (8, 800, 180, "ROS 1 node"),
+    "python": (8, 1000, 180, "Python module"),
 }
 EMBEDDABLE = {"core", "event", "camera", "imu", "map", "registration", "fusion", "tracker"}
 ROOF = {"apps", "ros", "python", "bench"}
 
 # The flow of the data: corners as (module, x share, side) or plain points, and a label with its place.
 FLOW = [
-    ([(300, 486), ("io", 0.483, "bottom")], "recordings, clouds, maps", (312, 480)),
-    ([("io", 1.0, "right"), (622, 413), (622, 325), ("tracker", 0.0, "left")], "", None),
-    ([("serve", 0.15, "bottom"), ("tracker", 0.0736, "top")], "packets", (687, 285)),
-    ([("tracker", 0.206, "top"), ("serve", 0.42, "bottom")], "poses", (758, 285)),
-    ([("tracker", 0.77, "top"), ("mavlink", 0.531, "bottom")], "poses", (1063, 285)),
-    ([("tracker", 0.03, "top"), (656, 281), (612, 281), (612, 149), ("run", 1.0, "right")], "", None),
+    ([(300, 524), ("io", 0.483, "bottom")], "recordings, clouds, maps", (312, 518)),
+    ([("io", 1.0, "right"), (622, 453), (622, 373), ("tracker", 0.0, "left")], "", None),
+    ([("serve", 0.15, "bottom"), ("tracker", 0.0736, "top")], "packets", (687, 338)),
+    ([("tracker", 0.206, "top"), ("serve", 0.42, "bottom")], "poses", (758, 338)),
+    ([("tracker", 0.77, "top"), ("mavlink", 0.531, "bottom")], "poses", (1063, 338)),
+    ([("tracker", 0.03, "top"), (656, 333), (612, 333), (612, 213), ("run", 1.0, "right")], "", None),
 ]
 
 
@@ -122,7 +122,7 @@ def faults(imports):
 
 def box_of(module):
     row, x, width, _ = PLACES[module]
-    return x, TOP + (7 - row) * ROW, width, 62
+    return x, TOP + (8 - row) * ROW, width, 58
 
 
 def corner(point):
@@ -140,7 +140,7 @@ def draw(imports, rooms):
            "<style>", ".box{fill:#f4f6f8;stroke:#5b6b7b}.core{fill:#e3edf7;stroke:#2f6ea8}"
            ".roof{fill:#fbf1e0;stroke:#b07a1e}.room{fill:#ffffff;stroke:#9aa7b3}",
            ".name{font-size:15px;font-weight:bold;text-anchor:middle;fill:#1c2733}"
-           ".does{font-size:12px;text-anchor:middle;fill:#465462}.small{font-size:11px;text-anchor:middle;fill:#1c2733}",
+           ".does{font-size:12px;text-anchor:middle;fill:#465462}.small{font-size:10.5px;text-anchor:middle;fill:#1c2733}",
            ".import{stroke:#b4bec8;stroke-width:1;fill:none}"
            ".flow{stroke:#b3402f;stroke-width:2;fill:none;marker-end:url(#tip)}"
            ".key{font-size:12px;fill:#465462}.data{font-size:12px;fill:#b3402f}",
@@ -158,19 +158,19 @@ def draw(imports, rooms):
         kind = "core" if module in EMBEDDABLE else "roof" if module in ROOF else "box"
         out.append(f'<rect class="{kind}" x="{x}" y="{y}" width="{width}" height="{height}" rx="6"/>')
         inner = in_order(rooms.get(module, []), imports, module)
-        out.append(f'<text class="name" x="{x + width / 2}" y="{y + (19 if inner else 27)}">{module}</text>')
-        out.append(f'<text class="does" x="{x + width / 2}" y="{y + (33 if inner else 45)}">{does}</text>')
+        out.append(f'<text class="name" x="{x + width / 2}" y="{y + (17 if inner else 25)}">{module}</text>')
+        out.append(f'<text class="does" x="{x + width / 2}" y="{y + (31 if inner else 43)}">{does}</text>')
         step = (width - 8) / max(1, len(inner))
         for k, room in enumerate(inner):
             left = x + 4 + k * step
-            out.append(f'<rect class="room" x="{left + 2:.1f}" y="{y + 39}" width="{step - 4:.1f}" height="18" rx="3"/>')
-            out.append(f'<text class="small" x="{left + step / 2:.1f}" y="{y + 52}">{room}</text>')
+            out.append(f'<rect class="room" x="{left + 2:.1f}" y="{y + 36}" width="{step - 4:.1f}" height="18" rx="3"/>')
+            out.append(f'<text class="small" x="{left + step / 2:.1f}" y="{y + 49}">{room}</text>')
     for points, label, place in FLOW:
         out.append('<path class="flow" d="' + " ".join(
             f"{'M' if k == 0 else 'L'}{x:.0f} {y:.0f}" for k, (x, y) in enumerate(map(corner, points))) + '"/>')
         if label:
             out.append(f'<text class="data" x="{place[0]}" y="{place[1]}">{label}</text>')
-    y = 545
+    y = 572
     out += [f'<rect class="core" x="20" y="{y}" width="26" height="16" rx="3"/>',
             f'<text class="key" x="56" y="{y + 13}">embeddable: Eigen alone; no files, sockets or wall clock</text>',
             f'<path class="import" d="M20 {y + 33} L46 {y + 33}"/>',

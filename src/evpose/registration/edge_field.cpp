@@ -7,32 +7,34 @@
 namespace evpose {
 namespace {
 
-constexpr int kWideImage_px = 800;  // from here on two pixels make one cell
-constexpr int kPatch = 3;           // cells to each side that tell an edge's direction
-constexpr int kFewest = 5;          // of them
-constexpr double kLinear = 0.5;     // (l1 - l0) / (l1 + l0) of their spread
-constexpr int kBlock = 16;          // cells; chance is counted over 5 x 5 blocks
-constexpr int kAround = 2;
-constexpr float kLeastChance = 0.01F;
+constexpr int kWideImage_px = 800;       // from here on two pixels make one cell, which bounds the cost
+constexpr int kPatch_cells = 3;          // to each side, whose active cells tell an edge's direction
+constexpr int kLeastCells = 5;           // active ones; fewer do not tell a direction
+constexpr double kLeastLinearity = 0.5;  // (l1 - l0) / (l1 + l0) of the eigenvalues of their scatter
+constexpr int kBlock_cells = 16;         // the background is averaged over 5 x 5 blocks of this edge
+constexpr int kNeighbourBlocks = 2;
+constexpr float kLeastBackground = 0.01F;  // bounds the weight of a lone edge
+constexpr float kCoarse_px = 6;            // reaches from one random guess to the next
+constexpr float kFine_px = 1.5F;  // what a slice of some milliseconds leaves of a contour's sharpness
 
 }  // namespace
+
+float EdgeField::spread_px(EdgeSpread spread) { return spread == EdgeSpread::coarse ? kCoarse_px : kFine_px; }
 
 EdgeField::EdgeField(ImageSize size)
     : size_(size),
       cell_(size.width > kWideImage_px ? 2 : 1),
       columns_((size.width + cell_ - 1) / cell_),
       rows_((size.height + cell_ - 1) / cell_),
-      block_columns_((columns_ + kBlock - 1) / kBlock),
-      block_rows_((rows_ + kBlock - 1) / kBlock) {
+      block_columns_((columns_ + kBlock_cells - 1) / kBlock_cells),
+      block_rows_((rows_ + kBlock_cells - 1) / kBlock_cells) {
   const std::size_t n = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   active_.resize(n);
   for (Plane& plane : planes_) plane.resize(n);
-  for (auto& spread : chance_)
+  for (auto& spread : background_)
     for (Plane& plane : spread)
       plane.resize(static_cast<std::size_t>(block_columns_) * static_cast<std::size_t>(block_rows_));
 }
-
-void EdgeField::set_spreads(float coarse_px, float fine_px) { spreads_ = {coarse_px, fine_px}; }
 
 int EdgeField::direction(double x, double y) {
   const double turn = std::atan2(y, x) / M_PI;  // -1 .. 1, lines repeat after 1
@@ -45,35 +47,35 @@ void EdgeField::build(std::span<const FrontEvent> events) {
     active_[static_cast<std::size_t>(e.y / cell_) * static_cast<std::size_t>(columns_) +
             static_cast<std::size_t>(e.x / cell_)] = 1;
   for (Plane& plane : planes_) std::fill(plane.begin(), plane.end(), kReach_px);
-  edges_ = 0;
-  for (int row = kPatch; row < rows_ - kPatch; ++row)
-    for (int column = kPatch; column < columns_ - kPatch; ++column) {
-      const std::size_t here = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                               static_cast<std::size_t>(column);
-      if (!active_[here]) continue;
-      int n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
-      for (int y = -kPatch; y <= kPatch; ++y)
-        for (int x = -kPatch; x <= kPatch; ++x)
-          if (active_[here + static_cast<std::size_t>(y * columns_ + x)])
-            ++n, sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y;
-      if (n < kFewest) continue;
-      const double mx = static_cast<double>(sx) / n, my = static_cast<double>(sy) / n;
-      const double a = static_cast<double>(sxx) / n - mx * mx, b = static_cast<double>(sxy) / n - mx * my,
-                   c = static_cast<double>(syy) / n - my * my;
-      const double difference = std::hypot(a - c, 2 * b);
-      if (difference < kLinear * (a + c)) continue;
-      ++edges_;
-      const double angle = 0.5 * std::atan2(2 * b, a - c);
-      const int middle = direction(std::cos(angle), std::sin(angle));
-      for (int k = -1; k <= 1; ++k)
-        planes_[static_cast<std::size_t>((middle + k + kDirections) % kDirections)][here] = 0;
-    }
-  for (Plane& plane : planes_) transform(plane);
-  count_chance();
+  for (int row = kPatch_cells; row < rows_ - kPatch_cells; ++row)
+    for (int column = kPatch_cells; column < columns_ - kPatch_cells; ++column) mark_edge(column, row);
+  for (Plane& plane : planes_) transform_distances(plane);
+  for (const EdgeSpread spread : {EdgeSpread::coarse, EdgeSpread::fine}) average_background(spread);
+}
+
+void EdgeField::mark_edge(int column, int row) {
+  const std::size_t here =
+      static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
+  if (!active_[here]) return;
+  int n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
+  for (int y = -kPatch_cells; y <= kPatch_cells; ++y)
+    for (int x = -kPatch_cells; x <= kPatch_cells; ++x)
+      if (active_[here + static_cast<std::size_t>(y * columns_ + x)])
+        ++n, sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y;
+  if (n < kLeastCells) return;
+  const double mx = static_cast<double>(sx) / n, my = static_cast<double>(sy) / n;
+  const double a = static_cast<double>(sxx) / n - mx * mx, b = static_cast<double>(sxy) / n - mx * my,
+               c = static_cast<double>(syy) / n - my * my;
+  const double difference = std::hypot(a - c, 2 * b);
+  if (difference < kLeastLinearity * (a + c)) return;
+  const double angle = 0.5 * std::atan2(2 * b, a - c);
+  const int middle = direction(std::cos(angle), std::sin(angle));
+  for (int k = -1; k <= 1; ++k)
+    planes_[static_cast<std::size_t>((middle + k + kDirections) % kDirections)][here] = 0;
 }
 
 /// Chamfer distances, two passes.
-void EdgeField::transform(Plane& plane) const {
+void EdgeField::transform_distances(Plane& plane) const {
   const auto straight = static_cast<float>(cell_), diagonal = static_cast<float>(M_SQRT2) * straight;
   const auto at = [&](int x, int y) -> float& {
     return plane[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
@@ -89,35 +91,43 @@ void EdgeField::transform(Plane& plane) const {
                            at(x + 1, y + 1) + diagonal, at(x - 1, y + 1) + diagonal});
 }
 
-void EdgeField::count_chance() {
-  std::array<float, static_cast<std::size_t>(kReach_px * 4) + 2> bell;
-  for (std::size_t s = 0; s < 2; ++s) {
-    for (std::size_t i = 0; i < bell.size(); ++i) {
-      const float d = static_cast<float>(i) / 4 / spreads_[s];
-      bell[i] = std::exp(-0.5F * d * d);
-    }
-    for (std::size_t k = 0; k < kDirections; ++k) {
-      Plane sums(chance_[s][k].size());
-      for (int y = 0; y < rows_; ++y)
-        for (int x = 0; x < columns_; ++x)
-          sums[static_cast<std::size_t>(y / kBlock) * static_cast<std::size_t>(block_columns_) +
-               static_cast<std::size_t>(x / kBlock)] +=
-              bell[static_cast<std::size_t>(4 * at(x, y, static_cast<int>(k)))];
-      for (int y = 0; y < block_rows_; ++y)
-        for (int x = 0; x < block_columns_; ++x) {
-          float sum = 0;
-          int cells = 0;
-          for (int v = std::max(0, y - kAround); v <= std::min(block_rows_ - 1, y + kAround); ++v)
-            for (int u = std::max(0, x - kAround); u <= std::min(block_columns_ - 1, x + kAround); ++u) {
-              sum += sums[static_cast<std::size_t>(v) * static_cast<std::size_t>(block_columns_) +
-                          static_cast<std::size_t>(u)];
-              cells += std::min(kBlock, columns_ - u * kBlock) * std::min(kBlock, rows_ - v * kBlock);
-            }
-          chance_[s][k][static_cast<std::size_t>(y) * static_cast<std::size_t>(block_columns_) +
-                        static_cast<std::size_t>(x)] =
-              std::max(kLeastChance, sum / static_cast<float>(cells));
-        }
-    }
+/// Sums of the likelihood over the cells of each block.
+EdgeField::Plane EdgeField::sum_blocks(int direction, EdgeSpread spread) const {
+  // Likelihood by distance, in quarters of a pixel.
+  std::array<float, static_cast<std::size_t>(kReach_px * 4) + 2> likelihood;
+  for (std::size_t i = 0; i < likelihood.size(); ++i) {
+    const float d = static_cast<float>(i) / 4 / spread_px(spread);
+    likelihood[i] = std::exp(-0.5F * d * d);
+  }
+  Plane sums(static_cast<std::size_t>(block_columns_) * static_cast<std::size_t>(block_rows_));
+  for (int y = 0; y < rows_; ++y)
+    for (int x = 0; x < columns_; ++x)
+      sums[static_cast<std::size_t>(y / kBlock_cells) * static_cast<std::size_t>(block_columns_) +
+           static_cast<std::size_t>(x / kBlock_cells)] +=
+          likelihood[static_cast<std::size_t>(4 * at(x, y, direction))];
+  return sums;
+}
+
+void EdgeField::average_background(EdgeSpread spread) {
+  for (int k = 0; k < kDirections; ++k) {
+    const Plane sums = sum_blocks(k, spread);
+    Plane& means = background_[static_cast<std::size_t>(spread)][static_cast<std::size_t>(k)];
+    for (int y = 0; y < block_rows_; ++y)
+      for (int x = 0; x < block_columns_; ++x) {
+        float sum = 0;
+        int cells = 0;
+        for (int v = std::max(0, y - kNeighbourBlocks); v <= std::min(block_rows_ - 1, y + kNeighbourBlocks);
+             ++v)
+          for (int u = std::max(0, x - kNeighbourBlocks);
+               u <= std::min(block_columns_ - 1, x + kNeighbourBlocks); ++u) {
+            sum += sums[static_cast<std::size_t>(v) * static_cast<std::size_t>(block_columns_) +
+                        static_cast<std::size_t>(u)];
+            cells += std::min(kBlock_cells, columns_ - u * kBlock_cells) *
+                     std::min(kBlock_cells, rows_ - v * kBlock_cells);
+          }
+        means[static_cast<std::size_t>(y) * static_cast<std::size_t>(block_columns_) +
+              static_cast<std::size_t>(x)] = std::max(kLeastBackground, sum / static_cast<float>(cells));
+      }
   }
 }
 
@@ -133,19 +143,19 @@ EdgeField::Sample EdgeField::sample(double x, double y, int direction) const {
           ((b - a) * (1 - fy) + (d - c) * fy) / cell, ((c - a) * (1 - fx) + (d - b) * fx) / cell};
 }
 
-float EdgeField::chance(double x, double y, int direction, int spread) const {
-  const int column = std::clamp(static_cast<int>(x) / cell_ / kBlock, 0, block_columns_ - 1),
-            row = std::clamp(static_cast<int>(y) / cell_ / kBlock, 0, block_rows_ - 1);
-  return chance_[static_cast<std::size_t>(spread)][static_cast<std::size_t>(direction)]
-                [static_cast<std::size_t>(row) * static_cast<std::size_t>(block_columns_) +
-                 static_cast<std::size_t>(column)];
+float EdgeField::background(double x, double y, int direction, EdgeSpread spread) const {
+  const int column = std::clamp(static_cast<int>(x) / cell_ / kBlock_cells, 0, block_columns_ - 1),
+            row = std::clamp(static_cast<int>(y) / cell_ / kBlock_cells, 0, block_rows_ - 1);
+  return background_[static_cast<std::size_t>(spread)][static_cast<std::size_t>(direction)]
+                    [static_cast<std::size_t>(row) * static_cast<std::size_t>(block_columns_) +
+                     static_cast<std::size_t>(column)];
 }
 
-float EdgeField::odds(double x, double y, int direction, int spread) const {
+float EdgeField::likelihood_ratio(double x, double y, int direction, EdgeSpread spread) const {
   const int column = std::clamp(static_cast<int>(std::lround(x)) / cell_, 0, columns_ - 1),
             row = std::clamp(static_cast<int>(std::lround(y)) / cell_, 0, rows_ - 1);
-  const float d = at(column, row, direction) / spreads_[static_cast<std::size_t>(spread)];
-  return std::exp(-0.5F * d * d) / chance(x, y, direction, spread);
+  const float d = at(column, row, direction) / spread_px(spread);
+  return std::exp(-0.5F * d * d) / background(x, y, direction, spread);
 }
 
 }  // namespace evpose

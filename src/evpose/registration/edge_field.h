@@ -11,9 +11,13 @@
 
 namespace evpose {
 
-/// How far each pixel is from the next edge of a given direction, in a slice of events short enough that
-/// contours stand still in it: a distance transform for each of eight directions. Unlike the time surface it
-/// reaches tens of pixels, so that a pose can be found that is nowhere near the predicted one.
+/// Standard deviation of edges about contours: wide while the pose is poorly known, narrow once it is
+/// refined.
+enum class EdgeSpread : std::uint8_t { coarse, fine };
+
+/// Distance of each pixel to the nearest edge of a given direction: one distance transform for each of eight
+/// directions. It is built from a slice of events so short that contours hardly move in it. Unlike the time
+/// surface it reaches tens of pixels, so that a pose far from the predicted one can be found.
 class EdgeField {
  public:
   static constexpr int kDirections = 8;
@@ -21,29 +25,25 @@ class EdgeField {
 
   explicit EdgeField(ImageSize size);
 
-  /// Events in any order; those whose neighbours lie on no line are left out.
+  /// Events in any order; those whose neighbours do not form a line are left out.
   void build(std::span<const FrontEvent> events);
 
-  /// Direction number of a line along (x, y).
+  /// Direction bin of a line along (x, y).
   static int direction(double x, double y);
 
   struct Sample {
-    float distance, dx, dy;  ///< px; its gradient
+    float distance, dx, dy;  ///< px, and its gradient
   };
-  /// Pixel at least one pixel inside the image.
+  /// Interpolated at a pixel at least one pixel inside the image.
   Sample sample(double x, double y, int direction) const;
 
-  /// Probability density ratio, edge against chance, of the distance at this pixel: `sigma_px` is the spread
-  /// of edges about contours; chance is how often such a distance occurs around this place. One of the two
-  /// spreads given to set_spreads, by number.
-  float odds(double x, double y, int direction, int spread) const;
-  /// How often an edge of this direction is as near as the spread around this place.
-  float chance(double x, double y, int direction, int spread) const;
-  void set_spreads(float coarse_px, float fine_px);
-  float spread_px(int spread) const { return spreads_[static_cast<std::size_t>(spread)]; }
-
-  /// Pixels with an edge of some direction.
-  int edges() const { return edges_; }
+  /// Likelihood ratio of the distance at this pixel: a contour's edge (a normal distribution of this spread)
+  /// against the background.
+  float likelihood_ratio(double x, double y, int direction, EdgeSpread spread) const;
+  /// Mean likelihood of an edge of this direction in the neighbourhood of this pixel, 0 to 1: high in
+  /// texture, where an edge is near at any pose.
+  float background(double x, double y, int direction, EdgeSpread spread) const;
+  static float spread_px(EdgeSpread spread);
 
  private:
   using Plane = std::vector<float>;
@@ -52,17 +52,18 @@ class EdgeField {
                   [static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
                    static_cast<std::size_t>(column)];
   }
-  void transform(Plane& plane) const;
-  void count_chance();
+  /// Sets the distance to zero in the directions of this cell's line, if its neighbours form one.
+  void mark_edge(int column, int row);
+  void transform_distances(Plane& plane) const;
+  void average_background(EdgeSpread spread);
+  Plane sum_blocks(int direction, EdgeSpread spread) const;
 
   ImageSize size_;
-  int cell_;  ///< pixels of the image to one of the field
+  int cell_;  ///< pixels of the image to one of the field, along each axis
   int columns_, rows_, block_columns_, block_rows_;
-  int edges_ = 0;
   std::vector<std::uint8_t> active_;
   std::array<Plane, kDirections> planes_;
-  std::array<float, 2> spreads_{6, 2};
-  std::array<std::array<Plane, kDirections>, 2> chance_;  ///< per spread, direction and block
+  std::array<std::array<Plane, kDirections>, 2> background_;  ///< per spread, direction and block
 };
 
 }  // namespace evpose

@@ -4,23 +4,31 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
-
-#include "evpose/core/config.h"
 
 namespace evpose {
 namespace {
 
-constexpr double kOutside = -0.3;   // log-odds of a point that has left the image: neither good nor bad
-constexpr double kCorrelated = 10;  // so many points share one error
-constexpr int kIterations = 5;      // at each width
-constexpr double kNarrowest_px = 1;
-constexpr double kSame_px = 3;  // poses that move the points by less are one
-constexpr double kTypicalDepth_m = 3;
+constexpr int kGuesses = 8000;                // fewer miss the true pose from 30 cm and 5 deg
+constexpr std::size_t kRefined = 80;          // of the guesses
+constexpr std::size_t kKept = 16;             // of the refined ones, for later slices to choose from
+constexpr double kSeenShare = 0.3;            // of the contours in view, motion makes so many visible
+constexpr std::size_t kComparedPoints = 200;  // enough to rank guesses
+constexpr double kOutsideScore = -0.3;        // of a point that has left the image: neither good nor bad
+constexpr double kCorrelatedPoints = 10;      // so many points share one error
+constexpr int kIterations = 5;                // at each width of the kernel
+constexpr double kNarrowing = 0.6;            // of the kernel, from width to width
+constexpr double kNarrowest_px = 1;           // the sharpness of the edges
+constexpr double kConverged = 0.05;    // a step below this share of the kernel's width ends the iterations
+constexpr double kDifferent_px = 3;    // poses that move the points by less are one
+constexpr double kTypicalDepth_m = 3;  // turns metres into pixels where poses are compared
+constexpr double kNearest_m = 0.05;    // points nearer to the camera are not projected
+constexpr double kMargin_px = 2;       // the field is interpolated inside of this
 
 double uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
 
-/// Two independent standard normal numbers are made of two uniform ones: the same on every platform.
+/// By the Box-Muller transform: the same on every platform, unlike std::normal_distribution.
 Vector6d standard_normal(std::mt19937& random) {
   Vector6d out;
   for (int i = 0; i < 6; i += 2) {
@@ -31,138 +39,151 @@ Vector6d standard_normal(std::mt19937& random) {
   return out;
 }
 
-struct Projector {
-  Projector(const SearchView& view, const Pose& T_map_body) : camera(view.camera), size(camera.size()) {
-    const Pose T_cam_map = (T_map_body * view.T_body_cam).inverse();
-    R = T_cam_map.rotation();
-    p = T_cam_map.p;
-  }
-  /// Pixel and direction number; false outside of the image.
-  bool operator()(const SearchPoint& point, Eigen::Vector2d* pixel, int* direction, Matrix23d* jacobian,
-                  Eigen::Vector3d* x_cam) const {
-    *x_cam = R * point.position + p;
-    if (x_cam->z() < 0.05) return false;
-    const auto u = camera.project(*x_cam, jacobian);
-    if (!u || !size.contains(*u, 2)) return false;
-    const Eigen::Vector2d along = *jacobian * (R * point.tangent);
-    *pixel = *u;
-    *direction = EdgeField::direction(along.x(), along.y());
-    return true;
-  }
-  const Camera& camera;
-  ImageSize size;
-  Eigen::Matrix3d R;
-  Eigen::Vector3d p;
+struct Projection {
+  Eigen::Vector2d pixel;
+  Matrix23d jacobian;     ///< of the pixel by x_cam
+  Eigen::Vector3d x_cam;  ///< the point, camera frame
+  int direction;          ///< bin of the contour's direction in the image
 };
 
-bool same(const Pose& a, const Pose& b, double focal_px) {
-  const Vector6d d = a.minus(b);
-  return focal_px * (d.head<3>().norm() / kTypicalDepth_m + d.tail<3>().norm()) < kSame_px;
+class Projector {
+ public:
+  Projector(const SearchView& view, const Pose& T_map_body) : camera_(view.camera), size_(camera_.size()) {
+    const Pose T_cam_map = (T_map_body * view.T_body_cam).inverse();
+    R_ = T_cam_map.rotation();
+    p_ = T_cam_map.p;
+  }
+  /// Nothing if the point is not in the image.
+  std::optional<Projection> operator()(const SearchPoint& point) const {
+    Projection out;
+    out.x_cam = R_ * point.position + p_;
+    if (out.x_cam.z() < kNearest_m) return {};
+    const auto pixel = camera_.project(out.x_cam, &out.jacobian);
+    if (!pixel || !size_.contains(*pixel, kMargin_px)) return {};
+    const Eigen::Vector2d along = out.jacobian * (R_ * point.tangent);
+    out.pixel = *pixel;
+    out.direction = EdgeField::direction(along.x(), along.y());
+    return out;
+  }
+
+ private:
+  const Camera& camera_;
+  ImageSize size_;
+  Eigen::Matrix3d R_;
+  Eigen::Vector3d p_;
+};
+
+/// Motion of a point at the typical depth in the image, px.
+double image_motion_px(const Vector6d& step, double focal_px) {
+  return focal_px * (step.head<3>().norm() / kTypicalDepth_m + step.tail<3>().norm());
 }
 
+/// Sorts, best first, and keeps the first of those that are one pose.
 void keep_different(std::vector<PoseGuess>& guesses, std::size_t most, double focal_px) {
   std::stable_sort(guesses.begin(), guesses.end(),
                    [](const PoseGuess& a, const PoseGuess& b) { return a.score > b.score; });
   std::vector<PoseGuess> out;
   for (const PoseGuess& g : guesses) {
     if (out.size() == most) break;
-    if (std::none_of(out.begin(), out.end(),
-                     [&](const PoseGuess& o) { return same(o.T_map_body, g.T_map_body, focal_px); }))
+    if (std::none_of(out.begin(), out.end(), [&](const PoseGuess& o) {
+          return image_motion_px(o.T_map_body.minus(g.T_map_body), focal_px) < kDifferent_px;
+        }))
       out.push_back(g);
   }
   guesses = std::move(out);
 }
 
-}  // namespace
-
-void describe(ConfigTable& table, PoseSearchConfig& c) {
-  table.add("guesses", c.guesses, "", "poses drawn from the prior", {1, 1e7});
-  table.add("refined", c.refined, "", "the best of them are refined", {1, 1e5});
-  table.add("kept", c.kept, "", "the best of these are followed", {1, 1000});
-  table.add("coarse_px", c.coarse_px, "px", "edges lie so far from contours when guesses are compared",
-            {1, 20});
-  table.add("fine_px", c.fine_px, "px", "... and when refined poses are", {0.3, 10});
-  table.add("seen_share", c.seen_share, "", "share of the contours in view that make events", {0.01, 0.99});
+/// Normal equations of the distances between contours and edges at `pose`, weighted by a kernel of this
+/// width, with the prior around `from`.
+struct NormalEquations {
+  Matrix6d H;
+  Vector6d b;
+};
+NormalEquations linearise(const SearchView& view, const Pose& pose, const Pose& from,
+                          const Matrix6d& prior_information, double width_px) {
+  const Eigen::Matrix3d R_cam_body = view.T_body_cam.rotation().transpose();
+  const double middle_px = std::sqrt(static_cast<double>(EdgeField::spread_px(EdgeSpread::coarse)) *
+                                     EdgeField::spread_px(EdgeSpread::fine));
+  const EdgeSpread spread = width_px > middle_px ? EdgeSpread::coarse : EdgeSpread::fine;
+  const Projector project(view, pose);
+  const Eigen::Matrix3d R_body_map = pose.rotation().transpose();
+  NormalEquations out{prior_information, -prior_information * pose.minus(from)};
+  for (const SearchPoint& point : view.points) {
+    const std::optional<Projection> seen = project(point);
+    if (!seen) continue;
+    const double x = seen->pixel.x(), y = seen->pixel.y();
+    const EdgeField::Sample s = view.field.sample(x, y, seen->direction);
+    const double kernel = std::exp(-0.5 * s.distance * s.distance / (width_px * width_px));
+    const double background = view.field.background(x, y, seen->direction, spread);
+    const double w = kSeenShare * kernel / (kSeenShare * kernel + (1 - kSeenShare) * background) /
+                     (width_px * width_px * kCorrelatedPoints);
+    const Eigen::RowVector3d A = Eigen::RowVector2d(s.dx, s.dy) * seen->jacobian * R_cam_body;
+    Vector6d row;  // derivative of the distance by the pose
+    row.head<3>() = -(A * R_body_map).transpose();
+    row.tail<3>() = -(view.T_body_cam * seen->x_cam).cross(A.transpose());
+    out.H += w * row * row.transpose();
+    out.b -= w * s.distance * row;
+  }
+  out.H.diagonal() *= 1 + 1e-6;  // a direction that neither prior nor contours hold
+  return out;
 }
 
-double PoseSearch::score(const SearchView& view, const Pose& T_map_body, int spread, std::size_t step) const {
+}  // namespace
+
+double refine_reach_px() { return 2 * static_cast<double>(EdgeField::spread_px(EdgeSpread::coarse)); }
+
+double score_pose(const SearchView& view, const Pose& T_map_body, EdgeSpread spread, std::size_t step) {
   const Projector project(view, T_map_body);
-  const auto seen = static_cast<float>(config_.seen_share);
+  const auto share = static_cast<float>(kSeenShare);
   double sum = 0;
   std::size_t count = 0;
-  Eigen::Vector2d pixel;
-  Eigen::Vector3d x_cam;
-  Matrix23d jacobian;
-  int direction = 0;
-  for (std::size_t i = 0; i < view.points.size(); i += step, ++count)
-    sum += project(view.points[i], &pixel, &direction, &jacobian, &x_cam)
-               ? std::log(1 - seen + seen * view.field.odds(pixel.x(), pixel.y(), direction, spread))
-               : kOutside;
+  for (std::size_t i = 0; i < view.points.size(); i += step, ++count) {
+    const std::optional<Projection> seen = project(view.points[i]);
+    sum += seen ? std::log(1 - share +
+                           share * view.field.likelihood_ratio(seen->pixel.x(), seen->pixel.y(),
+                                                               seen->direction, spread))
+                : kOutsideScore;
+  }
   return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
-PoseGuess PoseSearch::refine(const SearchView& view, const Pose& from, const Matrix6d& prior_information,
-                             double from_px) const {
+PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& prior_information,
+                      double from_px) {
   Pose pose = from;
-  const Eigen::Matrix3d R_cam_body = view.T_body_cam.rotation().transpose();
-  const double seen = config_.seen_share, middle_px = std::sqrt(config_.coarse_px * config_.fine_px);
-  for (double width = from_px; width >= kNarrowest_px; width *= 0.6)
+  for (double width_px = from_px; width_px >= kNarrowest_px; width_px *= kNarrowing)
     for (int iteration = 0; iteration < kIterations; ++iteration) {
-      const Projector project(view, pose);
-      const Eigen::Matrix3d R_body_map = pose.rotation().transpose();
-      Matrix6d H = prior_information;
-      Vector6d b = -prior_information * pose.minus(from);
-      Eigen::Vector2d pixel;
-      Eigen::Vector3d x_cam;
-      Matrix23d J;
-      int direction = 0;
-      for (const SearchPoint& point : view.points) {
-        if (!project(point, &pixel, &direction, &J, &x_cam)) continue;
-        const EdgeField::Sample s = view.field.sample(pixel.x(), pixel.y(), direction);
-        const double g = std::exp(-0.5 * s.distance * s.distance / (width * width));
-        const double chance = view.field.chance(pixel.x(), pixel.y(), direction, width > middle_px ? 0 : 1);
-        const double w = seen * g / (seen * g + (1 - seen) * chance) / (width * width * kCorrelated);
-        const Eigen::RowVector3d A = Eigen::RowVector2d(s.dx, s.dy) * J * R_cam_body;
-        Vector6d row;  // derivative of the distance by the pose
-        row.head<3>() = -(A * R_body_map).transpose();
-        row.tail<3>() = -(view.T_body_cam * x_cam).cross(A.transpose());
-        H += w * row * row.transpose();
-        b -= w * s.distance * row;
-      }
-      H.diagonal() *= 1 + 1e-6;
-      const Vector6d step = H.ldlt().solve(b);
+      const NormalEquations equations = linearise(view, pose, from, prior_information, width_px);
+      const Vector6d step = equations.H.ldlt().solve(equations.b);
       if (!step.allFinite()) break;
       pose = pose.plus(step);
-      if (view.camera.focal_px() * (step.head<3>().norm() / kTypicalDepth_m + step.tail<3>().norm()) <
-          0.05 * width)
-        break;
+      if (image_motion_px(step, view.camera.focal_px()) < kConverged * width_px) break;
     }
-  return {pose, score(view, pose, 1)};
+  return {pose, score_pose(view, pose, EdgeSpread::fine)};
 }
 
-std::vector<PoseGuess> PoseSearch::search(const SearchView& view, const Pose& prior,
-                                          const Matrix6d& covariance, unsigned seed) const {
+std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
+                                   unsigned seed) {
   std::mt19937 random(seed);
   const Matrix6d root = covariance.llt().matrixL();
-  const std::size_t step = std::max<std::size_t>(1, view.points.size() / 200);
+  const std::size_t step = std::max<std::size_t>(1, view.points.size() / kComparedPoints);
   std::vector<PoseGuess> guesses;
-  for (int i = 0; i < config_.guesses; ++i) {
+  for (int i = 0; i < kGuesses; ++i) {
     // The prior itself is the first guess.
     const Pose pose = i == 0 ? prior : prior.plus(root * standard_normal(random));
-    guesses.push_back({pose, score(view, pose, 0, step)});
+    guesses.push_back({pose, score_pose(view, pose, EdgeSpread::coarse, step)});
   }
-  const double focal = view.camera.focal_px();
+  const double focal_px = view.camera.focal_px();
   const PoseGuess first = guesses.front();
-  keep_different(guesses, static_cast<std::size_t>(config_.refined), focal);
+  keep_different(guesses, kRefined, focal_px);
   guesses.push_back(first);
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
-  const double evidence = static_cast<double>(view.points.size()) / kCorrelated;
+  const double evidence = static_cast<double>(view.points.size()) / kCorrelatedPoints;
   for (PoseGuess& g : guesses) {
-    g = refine(view, g.T_map_body, information, 2 * config_.coarse_px);
+    g = refine_pose(view, g.T_map_body, information, refine_reach_px());
     const Vector6d off = g.T_map_body.minus(prior);
     g.score -= 0.5 * off.dot(information * off) / evidence;
   }
-  keep_different(guesses, static_cast<std::size_t>(config_.kept), focal);
+  keep_different(guesses, kKept, focal_px);
   return guesses;
 }
 

@@ -50,7 +50,7 @@ TEST(EdgeField, DirectionOfALineHasNoSign) {
   }
 }
 
-TEST(EdgeField, OddsAreAboveOneOnALoneEdgeAndOneInTexture) {
+TEST(EdgeField, LikelihoodRatioIsAboveOneOnALoneEdgeAndOneInTexture) {
   EdgeField field(kSize);
   std::vector<FrontEvent> events;
   for (int y = 10; y < 230; ++y) {
@@ -59,9 +59,9 @@ TEST(EdgeField, OddsAreAboveOneOnALoneEdgeAndOneInTexture) {
   }
   field.build(events);
   const int upright = EdgeField::direction(0, 1);
-  EXPECT_GT(field.odds(60, 120, upright, 1), 10);
+  EXPECT_GT(field.likelihood_ratio(60, 120, upright, EdgeSpread::fine), 10);
   double mean = 0;
-  for (int x = 240; x < 272; ++x) mean += field.odds(x, 120, upright, 1) / 32;
+  for (int x = 240; x < 272; ++x) mean += field.likelihood_ratio(x, 120, upright, EdgeSpread::fine) / 32;
   EXPECT_NEAR(mean, 1, 0.1);
 }
 
@@ -105,31 +105,28 @@ class PoseSearchLaws : public ::testing::Test {
 };
 
 TEST_F(PoseSearchLaws, TheTruePoseScoresBest) {
-  const PoseSearch search{PoseSearchConfig{}};
-  const double best = search.score(view(), Pose{}, 1);
+  const double best = score_pose(view(), Pose{}, EdgeSpread::fine);
   for (int axis = 0; axis < 6; ++axis) {
     Vector6d d = Vector6d::Zero();
     d(axis) = 0.04;
-    EXPECT_GT(best, search.score(view(), Pose{}.plus(d), 1) + 0.03) << axis;
+    EXPECT_GT(best, score_pose(view(), Pose{}.plus(d), EdgeSpread::fine) + 0.03) << axis;
   }
 }
 
 TEST_F(PoseSearchLaws, RefiningReturnsToTheTruePose) {
-  const PoseSearch search{PoseSearchConfig{}};
   Vector6d d;
   d << 0.02, -0.03, 0.02, 0.01, 0.01, -0.015;
-  const PoseGuess refined = search.refine(view(), Pose{}.plus(d), Matrix6d::Identity(), 12);
+  const PoseGuess refined = refine_pose(view(), Pose{}.plus(d), Matrix6d::Identity(), 12);
   EXPECT_LT(refined.T_map_body.p.norm(), 0.006);
   EXPECT_LT(so3::log(refined.T_map_body.q).norm(), 0.003);
 }
 
 TEST_F(PoseSearchLaws, ThePoseIsFoundFromAWidePrior) {
-  const PoseSearch search{PoseSearchConfig{}};
   Vector6d d, sigma;
   d << 0.1, -0.1, 0.08, 0.03, -0.04, 0.02;
   sigma << 0.1, 0.1, 0.1, 0.04, 0.04, 0.04;
   const Matrix6d covariance = sigma.cwiseAbs2().asDiagonal();
-  const auto found = search.search(view(), Pose{}.plus(d), covariance, 1);
+  const auto found = search_pose(view(), Pose{}.plus(d), covariance, 1);
   ASSERT_FALSE(found.empty());
   EXPECT_LT(found[0].T_map_body.p.norm(), 0.01);
   EXPECT_LT(so3::log(found[0].T_map_body.q).norm(), 0.005);
@@ -137,10 +134,8 @@ TEST_F(PoseSearchLaws, ThePoseIsFoundFromAWidePrior) {
 }
 
 TEST_F(PoseSearchLaws, TheSameSeedGivesTheSamePoses) {
-  const PoseSearch search{PoseSearchConfig{}};
   const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
-  const auto a = search.search(view(), Pose{}, covariance, 5),
-             b = search.search(view(), Pose{}, covariance, 5);
+  const auto a = search_pose(view(), Pose{}, covariance, 5), b = search_pose(view(), Pose{}, covariance, 5);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].T_map_body.p, b[i].T_map_body.p);
 }

@@ -115,8 +115,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       visible_(index_, *setup_.camera, spread(config), config.threads > 1),
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
-      relocalizer_(config.relocalization, index_, pieces_, *setup_.camera, setup_.T_body_cam,
-                   fusion_->propagator().gravity_map()),
+      relocalizer_({index_, pieces_, *setup_.camera, fusion_->propagator().gravity_map(), config.visible,
+                    config.alignment}),
       health_(config.health),
       imu_watch_(config.imu),
       agreement_(config.agreement),
@@ -130,7 +130,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   health_.start(start.t);
   before_search_ = fusion_->state();
-  if (config.relocalization.on && sigma_px() > config.relocalization.from_px)
+  if (config.relocalization.on && sigma_px() > Relocalizer::kSearchAboveSigma_px)
     relocalizer_.begin_search(start.t, fusion_->state().nav, fusion_->state().pose_covariance());
   next_update_ = start_t_ + from_seconds(1 / config_.rate_hz);
   visible_.choose(start.T_map_body * setup_.T_body_cam);  // the dearest one, before the data come
@@ -337,8 +337,8 @@ std::string Tracker::weakest_direction() const {
 
 /// One update's part of the search for the pose; when it is found, tracking begins there.
 void Tracker::search(TimeNs t) {
-  const auto found =
-      relocalizer_.process(t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate);
+  const auto found = relocalizer_.process(
+      {t, front_.stamp(t), front_.kept(), moved_, fusion_->state().angular_rate, setup_.T_body_cam});
   if (!found) return;
   FusionState state =
       fusion_->propagator().initial_state(fusion_->state().t, found->nav, found->angular_rate);
@@ -348,13 +348,13 @@ void Tracker::search(TimeNs t) {
   const auto widen = [&state](int at, double sigma) {
     state.covariance.diagonal().segment<3>(at).setConstant(sigma * sigma);
   };
-  widen(error_state::kP, config_.relocalization.found_position_sigma_m);
-  widen(error_state::kPhi, config_.relocalization.found_rotation_sigma_rad);
-  widen(error_state::kV, config_.relocalization.found_velocity_sigma_m_s);
+  widen(error_state::kP, Relocalizer::kFoundPositionSigma_m);
+  widen(error_state::kPhi, Relocalizer::kFoundRotationSigma_rad);
+  widen(error_state::kV, Relocalizer::kFoundVelocitySigma_m_s);
   fusion_->start(state);
   alignment_.forget();
   agreement_.forget();
-  verify_until_ = t + from_seconds(config_.relocalization.verify_s);
+  verify_until_ = t + from_seconds(Relocalizer::kVerify_s);
 }
 
 double Tracker::plan_points(const Pose& T_map_body, double span_s) {
@@ -458,7 +458,7 @@ Update Tracker::update(TimeNs t) {
   out.innovation = innovation(fusion_->measured_covariance(), stpe.measurement);
   // A pose that was found is believed once its events have gathered at the contours for a while.
   const bool watched = verify_until_ != 0,
-             refuted = watched && t >= verify_until_ && stpe.slope < config_.relocalization.low_concentration;
+             refuted = watched && t >= verify_until_ && stpe.slope < Relocalizer::kLowConcentration;
   evidence.searching = searching || t < verify_until_ || refuted;
   evidence.refused = searching || refuted ? "searching for the pose"
                      : past               ? "the time offset has changed"

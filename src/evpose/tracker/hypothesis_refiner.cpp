@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/tracker/hypothesis_refiner.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace evpose {
+namespace {
+
+// From the accuracy of the coarse search to the gate of the tracker.
+constexpr std::array<double, 4> kGates_px{3, 1.5, 0.8, 0.5};
+constexpr int kStepsPerGate = 3;           // Gauss-Newton; more do not move the pose
+constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band is wider than its gate
+constexpr double kInterval_s = 0.008;      // contours hardly turn in it
+constexpr std::size_t kIntervals = 5;      // looked at together: with fewer, velocity drifts from the truth
+constexpr double kPriorSigma_m = 0.02, kPriorSigma_rad = 0.01;  // of a hypothesis before it is refined
+constexpr double kPriorSigma_m_s = 0.3;                         // of its velocity, once that is known
+constexpr int kVelocityKnownAfter = 3;                          // slices
+// Points: each is projected twelve times in each interval, so that there are fewer than in tracking.
+constexpr double kPointStride_px = 6;
+constexpr int kPoints = 1500;
+
+VisibleSetConfig points_to_refine(VisibleSetConfig config) {
+  config.stride_px = kPointStride_px;
+  config.budget = kPoints;
+  return config;
+}
+
+/// Contrast is not known from a pose that may be wrong, so polarity is not asked.
+EventAlignmentConfig under_gate(EventAlignmentConfig config, double gate_px) {
+  config.gate_px = config.widest_gate_px = gate_px;
+  config.count_px = kContrastReach_px;
+  config.polarity = config.honest_slope = false;
+  return config;
+}
+
+}  // namespace
+
+HypothesisRefiner::HypothesisRefiner(const RelocalizerScene& scene, const HypothesisMotion& motion)
+    : motion_(motion),
+      index_(scene.index),
+      segments_(scene.segments),
+      camera_(scene.camera),
+      map_sigma_m_(scene.alignment.map_sigma_m),
+      visible_(index_, camera_, points_to_refine(scene.visible)) {
+  alignments_.reserve(kGates_px.size());
+  for (const double gate_px : kGates_px)
+    alignments_.emplace_back(camera_.size(), under_gate(scene.alignment, gate_px), segments_.count);
+}
+
+void HypothesisRefiner::add_events(std::span<const FrontEvent> events, std::uint32_t now_us,
+                                   const ImuIncrement& motion, const Eigen::Vector3d& angular_rate) {
+  if (intervals_.empty() || intervals_.back().motion.dt_s >= kInterval_s) {
+    if (intervals_.size() == kIntervals) {
+      intervals_.push_back(std::move(intervals_.front()));
+      intervals_.pop_front();
+      intervals_.back().events.clear();
+      intervals_.back().motion = {};
+    } else {
+      intervals_.emplace_back();
+    }
+  }
+  Interval& newest = intervals_.back();
+  newest.events.insert(newest.events.end(), events.begin(), events.end());
+  newest.now_us = now_us;
+  newest.motion = joined(newest.motion, motion);
+  newest.angular_rate = angular_rate;
+}
+
+void HypothesisRefiner::refine(PoseHypothesis& h, const Pose& T_body_cam, int slices) {
+  const ContourView view{index_.map(), segments_, camera_, T_body_cam, map_sigma_m_};
+  const auto& points = visible_.choose(h.nav.T_map_body * T_body_cam);
+  const NavState from = h.nav;
+  const std::size_t intervals = std::min(intervals_.size(), static_cast<std::size_t>(1 + 2 * slices));
+  Vector9d prior_information;
+  prior_information.segment<3>(0).setConstant(1 / (kPriorSigma_m * kPriorSigma_m));
+  prior_information.segment<3>(3).setConstant(1 / (kPriorSigma_rad * kPriorSigma_rad));
+  prior_information.segment<3>(6).setConstant(
+      std::pow(slices < kVelocityKnownAfter ? kUnknownVelocitySigma_m_s : kPriorSigma_m_s, -2));
+  for (EventAlignment& alignment : alignments_)
+    for (int step = 0; step < kStepsPerGate; ++step) {
+      Vector9d off;
+      off << h.nav.T_map_body.minus(from.T_map_body), h.nav.velocity - from.velocity;
+      NormalEquations equations{prior_information.asDiagonal(), -prior_information.cwiseProduct(off)};
+      add_intervals(alignment, view, points, intervals, h, equations);
+      const Vector9d d = equations.H.ldlt().solve(equations.b);
+      // The last look is at the refined pose: it only measures.
+      const bool last = &alignment == &alignments_.back() && step + 1 == kStepsPerGate;
+      if (!d.allFinite() || last) continue;
+      h.nav.T_map_body = h.nav.T_map_body.plus(d.head<6>());
+      h.nav.velocity += d.tail<3>();
+    }
+}
+
+void HypothesisRefiner::add_intervals(EventAlignment& alignment, const ContourView& view,
+                                      std::span<const std::uint32_t> points, std::size_t intervals,
+                                      PoseHypothesis& h, NormalEquations& equations) {
+  const Matrix6d pose_covariance = Matrix6d::Zero();  // the gates are as they are
+  alignment.forget();
+  NavState nav = h.nav;
+  double age_s = 0, matched = 0, asked = 0;
+  for (std::size_t k = 0; k < intervals; ++k) {
+    const Interval& interval = intervals_[intervals_.size() - 1 - k];
+    const double span_s = interval.motion.dt_s;
+    const BodyMotion body{nav.T_map_body, nav.velocity, motion_.angular_rate(h, interval.angular_rate)};
+    project_contours(view, points, body, span_s, samples_);
+    const EventAlignmentResult r =
+        alignment.align({interval.events, interval.now_us, span_s, samples_, pose_covariance});
+    h.concentration = r.slope;
+    matched += r.matched_events;
+    asked += static_cast<double>(samples_.size());
+    // Derivative of the pose at this age by the newest pose and velocity.
+    Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
+    J.block<3, 3>(0, 0).setIdentity();
+    J.block<3, 3>(0, 6) = -age_s * Eigen::Matrix3d::Identity();
+    J.block<3, 3>(3, 3) = (nav.T_map_body.q.conjugate() * h.nav.T_map_body.q).toRotationMatrix();
+    equations.H += J.transpose() * r.information * J;
+    equations.b += J.transpose() * r.vector;
+    age_s += span_s;
+    nav = motion_.propagate_back(h, nav, interval.motion);
+  }
+  h.support = h.concentration * matched / std::max(1.0, asked);
+}
+
+}  // namespace evpose

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "evpose/imu/strapdown.h"
+#include "evpose/map/contour_segments.h"
+#include "evpose/map/visible_set.h"
+#include "evpose/registration/event_alignment.h"
+#include "evpose/tracker/contour_view.h"
+#include "evpose/tracker/pose_hypothesis.h"
+
+namespace evpose {
+
+/// What the search compares events with, and the settings of the tracker that hold for it too. The references
+/// outlive the search.
+struct RelocalizerScene {
+  const ContourIndex& index;
+  const ContourSegments& segments;
+  const Camera& camera;
+  Eigen::Vector3d gravity_map;     ///< zero when there is no IMU
+  VisibleSetConfig visible;        ///< the search has its own number and spacing of points
+  EventAlignmentConfig alignment;  ///< the search has its own gates and leaves polarity out
+};
+
+/// Refines pose and velocity of a hypothesis together: the single events of the last 40 ms at their own
+/// times, seen from where the IMU says that the body was, under gates that close from 3 px to that of the
+/// tracker.
+class HypothesisRefiner {
+ public:
+  HypothesisRefiner(const RelocalizerScene& scene, const HypothesisMotion& motion);
+
+  /// Leaves out the events of earlier searches.
+  void clear_events() { intervals_.clear(); }
+  /// Events up to `now_us`, how the body has moved since those before, and its present rate.
+  void add_events(std::span<const FrontEvent> events, std::uint32_t now_us, const ImuIncrement& motion,
+                  const Eigen::Vector3d& angular_rate);
+
+  /// Refines `h` and measures its concentration and support. `slices`: seen since the search began, which
+  /// tells how far back its motion is trusted and how well its velocity is known.
+  void refine(PoseHypothesis& h, const Pose& T_body_cam, int slices);
+
+ private:
+  using Vector9d = Eigen::Matrix<double, 9, 1>;
+  using Matrix9d = Eigen::Matrix<double, 9, 9>;
+
+  /// Some events one after another, up to now_us, and how the body moved meanwhile.
+  struct Interval {
+    std::vector<FrontEvent> events;
+    std::uint32_t now_us = 0;
+    ImuIncrement motion;
+    Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
+  };
+  /// Information about position, rotation and velocity.
+  struct NormalEquations {
+    Matrix9d H;
+    Vector9d b;
+  };
+  /// Adds the newest `intervals` at the hypothesis' pose, and tells its concentration and support.
+  void add_intervals(EventAlignment& alignment, const ContourView& view,
+                     std::span<const std::uint32_t> points, std::size_t intervals, PoseHypothesis& h,
+                     NormalEquations& equations);
+
+  HypothesisMotion motion_;
+  const ContourIndex& index_;
+  const ContourSegments& segments_;
+  const Camera& camera_;
+  double map_sigma_m_;
+  VisibleSet visible_;
+  std::vector<EventAlignment> alignments_;  ///< from a wide gate to the tracker's
+  std::deque<Interval> intervals_;          ///< the newest last
+  std::vector<ContourSample> samples_;
+};
+
+}  // namespace evpose

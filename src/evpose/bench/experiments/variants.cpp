@@ -14,7 +14,7 @@ namespace {
 
 const std::vector<Variant> kBackEnds{
     {"STPE alone", false, {"events.filter.on=false", "alignment.polarity=false"}},
-    {"... with filter and polarity", false, {}},
+    {"STPE with filter and polarity", false, {}},
     {"particle filter", true, {"fusion.kind=particle"}},
     {"EKF (full, the default)", true, {"fusion.kind=ekf"}},
     {"graph", true, {"fusion.kind=graph"}},
@@ -24,7 +24,7 @@ const std::vector<Variant> kBackEnds{
      {"fusion.kind=graph", "fusion.coupling=tight", "fusion.window.background=true"}},
     {"EKF, gravity's direction", true, {"fusion.slow.gravity=true"}},
     {"EKF, lasting offset", true, {"fusion.slow.pose_offset=true", "alignment.shared_s=0"}},
-    {"EKF, offsets of pieces", true, {"fusion.slow.piece_offset=on"}},
+    {"EKF, offsets of segments", true, {"fusion.slow.piece_offset=on"}},
 };
 
 const std::vector<Variant> kAblation{
@@ -39,9 +39,9 @@ const std::vector<Variant> kAblation{
     {"without ambiguity exclusion", true, {"alignment.ambiguity_px=0"}},
     {"without occlusion", true, {"visible.occlusion=false"}},
     {"without IMU", false, {}},
-    {"eq. (1), the exponential field", true, {"field=exponential"}},
-    {"... and without IMU (STPE)", false, {"field=exponential"}},
-    {"... and without noise filter", false, {"field=exponential", "events.filter.on=false"}},
+    {"the paper's field", true, {"field=exponential"}},
+    {"the paper's field without IMU (STPE)", false, {"field=exponential"}},
+    {"the paper's field without IMU and noise filter", false, {"field=exponential", "events.filter.on=false"}},
 };
 
 struct Figures {

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pages of docs/results whose figures `evpose bench` prints, and the picture of the ablation."""
+import re
+
+import drawing
+import harness
+
+FLIGHTS = [("indoor_spiral", "camera.size=720p"), ("people", "camera.size=vga"), ("hdr_window", "camera.size=vga"),
+           ("turning_3", "camera.size=vga"), ("landing", "camera.size=vga"), ("outdoor_spiral", "camera.size=vga"),
+           ("speed_1", "camera.size=vga"), ("speed_3", "camera.size=vga")]
+FLIGHT_S = 1.5
+MOVING = {"fan": ("camera.size=vga",), "people": ("camera.size=vga",), "car": tuple(harness.TINY)}
+BAR, BAR_WEAK, BAR_END_MM = "#1f77d0", "#a9c4e2", 4
+
+
+def variants(bench, experiment, recording, *begins):
+    """Rows of `evpose bench EXPERIMENT`, by variant."""
+    words = ["bench", experiment, "--recording", recording.folder, "--map", recording.contours, "--occluders",
+             recording.mesh, *(word for begin in begins for word in ("--variant", begin))]
+    printed = bench.once(f"{experiment}: {recording.name} {' '.join(begins)}", lambda: bench.run(*words))
+    (rows,) = harness.read_tables(printed).values()
+    return {row["variant"]: row for row in rows}
+
+
+def errors(row):
+    return f"{row['ATE mean mm']}, {row['ARE mean deg']}"
+
+
+def make_fusion(bench):
+    begins = ["EKF (full"] if bench.quick else []
+    shared = {recording.name: variants(bench, "fusion", recording, *begins) for recording in bench.peers()}
+    flown = {}
+    for scenario, size in FLIGHTS[1:2] if bench.quick else FLIGHTS:
+        name = scenario + ("_720p" if size.endswith("720p") else "")
+        flown[name] = variants(bench, "fusion", bench.simulated(scenario, FLIGHT_S, (size,), name), *begins)
+    cells = {"mean ATE mm, mean ARE deg": errors,
+             "NEES/6, velocity mm/s, jitter mm": lambda r: f"{r['NEES/6']}, {r['velocity mm/s']}, {r['jitter mm']}",
+             "RTE over 10 and 100 ms, mm": lambda r: f"{r['RTE 10 ms mm']}, {r['RTE 100 ms mm']}"}
+    lines = [line for what, cell in cells.items()
+             for line in (what[0].upper() + what[1:] + ":", "", *harness.pivot(shared, cell), "")]
+    names = list(dict.fromkeys(name for rows in flown.values() for name in rows))
+    simulated = harness.table(["recording", *names],
+                              [[name, *(f"{errors(rows[v])}, {rows[v]['NEES/6']}" for v in names)]
+                               for name, rows in flown.items()])
+    return bench.write_page("fusion", {"shared recordings": lines, "simulated flights": simulated})
+
+
+def make_ablation(bench):
+    begins = ["all", "without IMU"] if bench.quick else []
+    measured = {recording.name: variants(bench, "ablation", recording, *begins) for recording in bench.peers()}
+    draw_ablation(bench.image("ablation.svg"), measured)
+    lines = ["Mean ATE mm, mean ARE deg:", "", *harness.pivot(measured, errors), "", "NEES/6:", "",
+             *harness.pivot(measured, lambda row: row["NEES/6"])]
+    return bench.write_page("ablation", {"variants": lines})
+
+
+def draw_ablation(path, measured):
+    """A bar a variant, a column a recording."""
+    names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
+    left, row, panel = 300, 18, 120
+    svg = drawing.Svg(left + (panel + 40) * len(measured), 60 + row * len(names))
+    svg.text(12, 20, f"Mean error, mm (bars end at {BAR_END_MM} mm; faint: not `tracking` at the end)", size=15)
+    for i, name in enumerate(names):
+        svg.text(left - 10, 52 + i * row + row - 7, name, "end")
+    for j, (recording, rows) in enumerate(measured.items()):
+        x = left + j * (panel + 40)
+        svg.text(x, 44, recording)
+        for i, name in enumerate(names):
+            if name not in rows:
+                continue
+            value, y = float(rows[name]["ATE mean mm"]), 52 + i * row
+            length = panel * min(value, BAR_END_MM) / BAR_END_MM
+            svg.bar(x, y, length, row - 5, BAR if rows[name]["at the end"] == "tracking" else BAR_WEAK)
+            svg.text(x + length + 4, y + row - 7, f"{value:.2f}", size=10)
+    svg.write(path)
+
+
+def make_relocalization(bench):
+    seeds = 1 if bench.quick else 20
+    printed = [bench.once(f"relocalization: {recording.name}, {seeds}",
+                          lambda: bench.run("bench", "relocalization", bench.shared / "data/peer", "--only",
+                                            recording.name, "--seeds", seeds)) for recording in bench.peers()]
+    tables = [harness.read_tables(text)[""] for text in printed]
+    rows = [list(row.values()) for rows in tables for row in rows]
+    lines = [printed[0].split("\n", 1)[0], "", *harness.table(list(tables[0][0]), rows)]
+    return bench.write_page("relocalization", {"starts": lines})
+
+
+def make_faults(bench):
+    few = ["--only", "room_720p", "--replays", 12] if bench.quick else []
+    printed = bench.once("faults", lambda: bench.run("bench", "faults", bench.shared / "data/peer", *few))
+    return bench.write_page("faults", {"replays": printed.splitlines()})
+
+
+def make_calibration(bench):
+    only = ["--only", "room_720p"] if bench.quick else []
+    printed = bench.once("calibration", lambda: bench.run("bench", "calibration", bench.shared / "data/peer", *only))
+    return bench.write_page("calibration", {"errors": printed.splitlines()})
+
+
+def event_table(texts):
+    """A row for a kind of events, a column for a recording: shares left out for polarity and for motion, and of what is used."""
+    columns = {}
+    for name, text in texts.items():
+        (rows,) = harness.read_tables(text).values()
+        column = {row["events"]: f"{row['left out: polarity']}, {row['left out: motion']}, {row['share of the used']}"
+                  for row in rows}
+        right, buffer = re.search(r"zone: ([\d.]+ %) right.* ([\d.]+ %) lie in", text).groups()
+        columns[name] = {**column, "polarity predicted rightly, share in the buffer zone": f"{right}, {buffer}"}
+    kinds = list(next(iter(columns.values())))
+    return harness.table(["events", *columns], [[kind, *(column[kind] for column in columns.values())] for kind in kinds])
+
+
+def make_events(bench):
+    tables = {"defaults": [], "flow": ["--set", "alignment.flow.on=true"]}
+    figures = {}
+    for key, settings in tables.items():
+        texts = {}
+        for scenario, size in list(MOVING.items())[:1] if bench.quick else MOVING.items():
+            recording = bench.simulated(scenario, FLIGHT_S, (*size, "truth.events=true"), f"{scenario}_truth")
+            name = scenario + (", 320x240" if size == tuple(harness.TINY) else "")
+            texts[name] = bench.once(f"events: {scenario}, {key}",
+                                     lambda: bench.run("bench", "events", recording.folder, *settings))
+        figures[key] = event_table(texts)
+    return bench.write_page("events", figures)

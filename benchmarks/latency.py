@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""docs/results/latency.md: where the time of an update goes, on one core; for a machine that does nothing else.
+
+What passes between the newest event and the pose, by stage, with the share of a core and the peak of memory.
+"""
+import csv
+
+import harness
+
+RUNS = [("room_spiral", 300), ("room_spiral", 1000), ("room_720p", 300), ("room_720p", 1000)]
+STAGES = ["predict", "choose", "register", "fuse"]
+
+
+def at(values, share):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(share * len(values)))]
+
+
+def measure(bench, recording, rate_hz):
+    with bench.folder() as scratch:
+        summary = bench.track(recording.folder, recording.contours, scratch / "run", "--occluders", recording.mesh,
+                              "--set", f"rate_hz={rate_hz}", "--set", "overlays=0")
+        with open(scratch / "run/latency.csv") as file:
+            updates = [{k: float(v) for k, v in u.items()} for u in csv.DictReader(file)]
+    stages = [[u[f"{s}_ms"] for u in updates] for s in STAGES]
+    total = [sum(times) for times in zip(*stages)]
+    resources = summary["resources"]
+    return [recording.name, rate_hz, *(f"{at(s, 0.5):.2f} / {at(s, 0.99):.2f}" for s in [*stages, total]),
+            f"{at([u['events_ms'] for u in updates], 0.5):.2f}", f"{100 * resources['cpu_share']:.0f} %",
+            f"{resources['peak_memory_mb']:.0f}", f"{summary['accuracy']['ate_mean_mm']:.2f}"]
+
+
+def make(bench):
+    rows = [bench.once(f"latency: {name} at {rate} Hz", lambda: measure(bench, bench.peer(name), rate))
+            for name, rate in (RUNS[2:3] if bench.quick else RUNS)]
+    heads = ["recording", "updates a second", "predict", "choose points", "register", "fuse", "newest event to pose",
+             "events before (p50)", "share of a core", "peak memory MB", "ATE mm"]
+    return bench.write_page("latency", {"stages": harness.table(heads, rows)}, harness.machine())

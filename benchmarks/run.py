@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes the figures of docs/results and the pictures of docs/images.
+
+    benchmarks/run.py list            names, what they make, how long they take
+    benchmarks/run.py all             everything, one after the other
+    benchmarks/run.py accuracy map    these
+
+A page keeps its words; the figures between its marks and its first line are written anew. What was measured with this
+program is kept in SCRATCH/measured and not measured again, so that an interrupted run goes on where it was; recordings that
+are simulated stay in SCRATCH/recordings. Needs a Python with numpy and h5py, and chromium for the pictures of maps.
+"""
+import argparse
+import importlib
+import pathlib
+import sys
+import time
+
+import harness
+
+# Name, module and function, what is made, how long it takes on two cores.
+BENCHMARKS = {
+    "accuracy": ("accuracy", "make", "shared recordings and a real chunk, by field and IMU", "2 min"),
+    "simulator": ("simulator", "make", "simulated flights", "2 h"),
+    "ablation": ("experiments", "make_ablation", "the tracker without one of its parts; its picture", "10 min"),
+    "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
+    "relocalization": ("experiments", "make_relocalization", "starts from wrong poses", "20 min"),
+    "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
+    "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
+    "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "2 min"),
+    "map": ("map", "make", "maps built from clouds, and tracking with them", "15 min"),
+    "map-scale": ("map_scale", "make", "time and memory of map building", "10 min"),
+    "latency": ("latency", "make", "stages of an update on whole recordings", "1 min"),
+    "performance": ("performance", "make", "kernels and decoders by themselves (evpose_microbench)", "10 min"),
+    "live": ("live", "make", "delay of evpose serve", "1 min"),
+    "soak": ("live", "make_soak", "memory of evpose serve over half an hour", "30 min"),
+    "simulator-peer": ("simulator_peer", "make", "the simulator beside an independent one; its pictures", "10 min"),
+    "update-picture": ("pictures", "make_update", "docs/images/update.svg, overlay.png", "10 s"),
+    "error-picture": ("error_picture", "make", "docs/images/fusion_error.svg", "10 s"),
+    "landing-pictures": ("landing_pictures", "make", "docs/images/landing_*.png", "3 min"),
+    "map-pictures": ("map_pictures", "make", "docs/images/map_*.png", "2 min"),
+}
+
+
+def parse():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="+", metavar="NAME", help="list, all, or names of the list")
+    parser.add_argument("--evpose", default=harness.ROOT / "build/release/apps/evpose/evpose", type=pathlib.Path)
+    parser.add_argument("--microbench", type=pathlib.Path,
+                        default=harness.ROOT / "build/bench/src/evpose/bench/micro/evpose_microbench")
+    parser.add_argument("--shared", default=harness.ROOT.parent / "shared", type=pathlib.Path,
+                        help="folder with the shared recordings")
+    parser.add_argument("--scratch", default=harness.ROOT / "build/benchmarks", type=pathlib.Path)
+    parser.add_argument("--fresh", action="store_true", help="measure again what is kept")
+    parser.add_argument("--quick", action="store_true",
+                        help="a little of each, to see that it works; pages and pictures go to SCRATCH/quick")
+    options = parser.parse_args()
+    unknown = set(options.names) - set(BENCHMARKS) - {"all", "list"}
+    if unknown:
+        parser.error(f"no such benchmark: {', '.join(sorted(unknown))}; see benchmarks/run.py list")
+    return options
+
+
+def main():
+    options = parse()
+    if "list" in options.names:
+        for name, (_, _, what, duration) in BENCHMARKS.items():
+            print(f"{name:18} {duration:>7}  {what}")
+        return 0
+    docs = options.scratch / "quick" if options.quick else harness.ROOT / "docs"
+    bench = harness.Bench(options.evpose, options.microbench, options.shared, options.scratch, docs, options.quick)
+    if options.fresh:
+        bench.forget()
+    failed = []
+    for name in BENCHMARKS if "all" in options.names else options.names:
+        module, function, _, _ = BENCHMARKS[name]
+        print(name, flush=True)
+        start = time.monotonic()
+        try:
+            made = getattr(importlib.import_module(module), function)(bench)
+            print(f"  {made} in {time.monotonic() - start:.0f} s", flush=True)
+        except (harness.Failure, OSError) as reason:
+            print(f"  failed: {reason}", flush=True)
+            failed.append(name)
+    if failed:
+        print(f"failed: {', '.join(failed)}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import harness
+import tables
 
 PAPER = ["--set", "field=exponential"]
 
@@ -73,11 +74,11 @@ def shared_tables(bench):
                                      lambda: measure(bench, recording, variant))
             for variant in (VARIANTS[:2] + VARIANTS[-1:] if bench.quick else VARIANTS)}
     first = VARIANTS[0].name
-    errors = harness.pivot(measured, mean_errors)
+    errors = tables.pivot(measured, mean_errors)
     later = [f"{first}, after {harness.START_S} s", *(mean_errors(rows[first], True) for rows in measured.values())]
     errors.insert(3, "| " + " | ".join(later) + " |")
     detailed = {name: {v: row for v, row in rows.items() if v in DETAILED} for name, rows in measured.items()}
-    return [*errors, "", "NEES/6, lag ms:", "", *harness.pivot(detailed, consistency)]
+    return [*errors, "", "NEES/6, lag ms:", "", *tables.pivot(detailed, consistency)]
 
 
 def real_chunk(bench):
@@ -92,7 +93,7 @@ def real_chunk(bench):
         return json.loads(done.stdout)
 
     figures = bench.once("accuracy: real chunk", measure_chunk)
-    return harness.table(["figure", "value"], [(k, v) for k, v in figures.items() if not isinstance(v, dict)])
+    return tables.table(["figure", "value"], [(k, v) for k, v in figures.items() if not isinstance(v, dict)])
 
 
 def make(bench):

@@ -4,6 +4,7 @@ import re
 
 import drawing
 import harness
+import tables
 
 FLIGHTS = [("indoor_spiral", "camera.size=720p"), ("people", "camera.size=vga"), ("hdr_window", "camera.size=vga"),
            ("turning_3", "camera.size=vga"), ("landing", "camera.size=vga"), ("outdoor_spiral", "camera.size=vga"),
@@ -18,7 +19,7 @@ def variants(bench, experiment, recording, *begins):
     words = ["bench", experiment, "--recording", recording.folder, "--map", recording.contours, "--occluders",
              recording.mesh, *(word for begin in begins for word in ("--variant", begin))]
     printed = bench.once(f"{experiment}: {recording.name} {' '.join(begins)}", lambda: bench.run(*words))
-    (rows,) = harness.read_tables(printed).values()
+    (rows,) = tables.read(printed).values()
     return {row["variant"]: row for row in rows}
 
 
@@ -37,11 +38,8 @@ def make_fusion(bench):
              "NEES/6, velocity mm/s, jitter mm": lambda r: f"{r['NEES/6']}, {r['velocity mm/s']}, {r['jitter mm']}",
              "RTE over 10 and 100 ms, mm": lambda r: f"{r['RTE 10 ms mm']}, {r['RTE 100 ms mm']}"}
     lines = [line for what, cell in cells.items()
-             for line in (what[0].upper() + what[1:] + ":", "", *harness.pivot(shared, cell), "")]
-    names = list(dict.fromkeys(name for rows in flown.values() for name in rows))
-    simulated = harness.table(["recording", *names],
-                              [[name, *(f"{errors(rows[v])}, {rows[v]['NEES/6']}" for v in names)]
-                               for name, rows in flown.items()])
+             for line in (what[0].upper() + what[1:] + ":", "", *tables.pivot(shared, cell), "")]
+    simulated = tables.transposed(flown, lambda row: f"{errors(row)}, {row['NEES/6']}")
     return bench.write_page("fusion", {"shared recordings": lines, "simulated flights": simulated})
 
 
@@ -49,8 +47,8 @@ def make_ablation(bench):
     begins = ["all", "without IMU"] if bench.quick else []
     measured = {recording.name: variants(bench, "ablation", recording, *begins) for recording in bench.peers()}
     draw_ablation(bench.image("ablation.svg"), measured)
-    lines = ["Mean ATE mm, mean ARE deg:", "", *harness.pivot(measured, errors), "", "NEES/6:", "",
-             *harness.pivot(measured, lambda row: row["NEES/6"])]
+    lines = ["Mean ATE mm, mean ARE deg:", "", *tables.pivot(measured, errors), "", "NEES/6:", "",
+             *tables.pivot(measured, lambda row: row["NEES/6"])]
     return bench.write_page("ablation", {"variants": lines})
 
 
@@ -80,9 +78,8 @@ def make_relocalization(bench):
     printed = [bench.once(f"relocalization: {recording.name}, {seeds}",
                           lambda: bench.run("bench", "relocalization", bench.shared / "data/peer", "--only",
                                             recording.name, "--seeds", seeds)) for recording in bench.peers()]
-    tables = [harness.read_tables(text)[""] for text in printed]
-    rows = [list(row.values()) for rows in tables for row in rows]
-    lines = [printed[0].split("\n", 1)[0], "", *harness.table(list(tables[0][0]), rows)]
+    rows = [row for text in printed for row in tables.read(text)[""]]
+    lines = [printed[0].split("\n", 1)[0], "", *tables.table(list(rows[0]), [row.values() for row in rows])]
     return bench.write_page("relocalization", {"starts": lines})
 
 
@@ -102,19 +99,19 @@ def event_table(texts):
     """A row for a kind of events, a column for a recording: shares left out for polarity and for motion, and of what is used."""
     columns = {}
     for name, text in texts.items():
-        (rows,) = harness.read_tables(text).values()
+        (rows,) = tables.read(text).values()
         column = {row["events"]: f"{row['left out: polarity']}, {row['left out: motion']}, {row['share of the used']}"
                   for row in rows}
         right, buffer = re.search(r"zone: ([\d.]+ %) right.* ([\d.]+ %) lie in", text).groups()
         columns[name] = {**column, "polarity predicted rightly, share in the buffer zone": f"{right}, {buffer}"}
     kinds = list(next(iter(columns.values())))
-    return harness.table(["events", *columns], [[kind, *(column[kind] for column in columns.values())] for kind in kinds])
+    return tables.table(["events", *columns], [[kind, *(column[kind] for column in columns.values())] for kind in kinds])
 
 
 def make_events(bench):
-    tables = {"defaults": [], "flow": ["--set", "alignment.flow.on=true"]}
+    kinds = {"defaults": [], "flow": ["--set", "alignment.flow.on=true"]}
     figures = {}
-    for key, settings in tables.items():
+    for key, settings in kinds.items():
         texts = {}
         for scenario, size in list(MOVING.items())[:1] if bench.quick else MOVING.items():
             recording = bench.simulated(scenario, FLIGHT_S, (*size, "truth.events=true"), f"{scenario}_truth")

@@ -187,35 +187,3 @@ def digest(what):
 
 def last_line(text):
     return (text.strip().splitlines() or ["no word why"])[-1]
-
-
-# ---- Markdown
-
-def table(heads, rows):
-    return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads),
-            *("| " + " | ".join(str(cell) for cell in row) + " |" for row in rows)]
-
-
-def read_tables(text):
-    """Rows (a dictionary each) of the tables of a Markdown text, by the heading before them."""
-    tables, name, heads = {}, "", None
-    for line in text.splitlines():
-        if line.startswith("### "):
-            name, heads = line[4:], None
-        elif not line.startswith("|"):
-            heads = None
-        elif not set(line) <= set("|-"):
-            cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-            if heads is None:
-                heads = cells
-            else:
-                tables.setdefault(name, []).append(dict(zip(heads, cells)))
-    return tables
-
-
-def pivot(rows_of, cell):
-    """A table with a row a variant and a column a recording. `rows_of`: recording -> {variant: row}."""
-    variants = list(dict.fromkeys(variant for rows in rows_of.values() for variant in rows))
-    return table(["variant", *rows_of],
-                 [[variant, *(cell(rows[variant]) if variant in rows else "-" for rows in rows_of.values())]
-                  for variant in variants])

@@ -6,6 +6,7 @@ What passes between the newest event and the pose, by stage, with the share of a
 import csv
 
 import harness
+import tables
 
 RUNS = [("room_spiral", 300), ("room_spiral", 1000), ("room_720p", 300), ("room_720p", 1000)]
 STAGES = ["predict", "choose", "register", "fuse"]
@@ -35,4 +36,4 @@ def make(bench):
             for name, rate in (RUNS[2:3] if bench.quick else RUNS)]
     heads = ["recording", "updates a second", "predict", "choose points", "register", "fuse", "newest event to pose",
              "events before (p50)", "share of a core", "peak memory MB", "ATE mm"]
-    return bench.write_page("latency", {"stages": harness.table(heads, rows)}, harness.machine())
+    return bench.write_page("latency", {"stages": tables.table(heads, rows)}, harness.machine())

@@ -20,36 +20,23 @@ import sys
 import h5py
 import numpy as np
 
+import files
+
 WIDTH, HEIGHT = 346, 260
 MARGIN_PX = 10
 README_TWIST = ((0.013, 0.162, 0.006), (0.075, -0.090, -0.072))  # rad/s, m/s; camera axes
 
 
-def rotation(q):
-    x, y, z, w = np.moveaxis(np.asarray(q), -1, 0)
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+class CameraPath(files.Trajectory):
+    """Camera poses in the world."""
 
-
-class Trajectory:
-    """Camera poses in the world; linear in position, normalised linear in the quaternion (poses lie close)."""
-
-    def __init__(self, rows):
-        self.t, self.p, self.q = rows[:, 0], rows[:, 1:4], rows[:, 4:8].copy()
-        for k in range(1, len(self.q)):
-            if self.q[k] @ self.q[k - 1] < 0:
-                self.q[k] *= -1
-
-    def at(self, t):
-        p = np.stack([np.interp(t, self.t, c) for c in self.p.T], -1)
-        q = np.stack([np.interp(t, self.t, c) for c in self.q.T], -1)
-        return p, rotation(q / np.linalg.norm(q, axis=-1, keepdims=True))
+    def pose(self, t):
+        p, q = self.at(t)
+        return p, files.rotation(q)
 
     def twist(self, t, half_s=0.05):
         """Mean angular and linear velocity around t, in the camera's axes."""
-        (p0, r0), (p1, r1), (_, r) = self.at(t - half_s), self.at(t + half_s), self.at(t)
+        (p0, r0), (p1, r1), (_, r) = self.pose(t - half_s), self.pose(t + half_s), self.pose(t)
         d = r0.T @ r1
         w = np.array([d[2, 1] - d[1, 2], d[0, 2] - d[2, 0], d[1, 0] - d[0, 1]]) / 2
         return w / (2 * half_s), r.T @ (p1 - p0) / (2 * half_s)
@@ -59,7 +46,7 @@ class Chunk:
     def __init__(self, folder):
         with h5py.File(folder / "events.h5") as file:
             self.data = {name: file["events"][name][:] for name in ("t", "x", "y", "p", "depth", "x_rect", "y_rect")}
-        self.truth = Trajectory(np.loadtxt(folder / "groundtruth.txt"))
+        self.truth = CameraPath(np.loadtxt(folder / "groundtruth.txt"))
         calibration = (folder / "calibration.yaml").read_text()
         lists = [[float(v) for v in m.split(",")] for m in re.findall(r"\[([^\]]*)\]", calibration)]
         self.raw, self.distortion, self.rectified = lists[0], lists[1], lists[2]
@@ -71,12 +58,12 @@ class Chunk:
         self.t = d["t"] * 1e-6
 
     def in_world(self, trajectory, keep):
-        p, r = trajectory.at(self.t[keep])
+        p, r = trajectory.pose(self.t[keep])
         return np.einsum("nij,nj->ni", r, self.in_cam[keep]) + p
 
     def project(self, world, trajectory, t):
         """Rectified pixels at time t."""
-        p, r = trajectory.at(t)
+        p, r = trajectory.pose(t)
         x = (world - p) @ r @ self.r_rect_raw.T
         f, _, cx, cy = self.rectified
         return f * x[:, :2] / x[:, 2:] + (cx, cy), x[:, 2]
@@ -125,7 +112,7 @@ def contour_points(chunk, until_s):
     ridge[:MARGIN_PX], ridge[-MARGIN_PX:], ridge[:, :MARGIN_PX], ridge[:, -MARGIN_PX:] = False, False, False, False
     rows = []
     f, _, cx, cy = chunk.rectified
-    p, r = chunk.truth.at(middle)
+    p, r = chunk.truth.pose(middle)
     for y, x in np.argwhere(ridge):
         at = np.array([x + offset[y, x] * nx[y, x], y + offset[y, x] * ny[y, x]])
         near = (np.abs(pixel - at) < 1.5).all(axis=1)
@@ -182,10 +169,10 @@ def main():
     if tracked.returncode not in (0, 1):
         sys.exit(tracked.stderr.strip())
     summary = json.loads((args.out / "run" / "summary.json").read_text())
-    estimate = Trajectory(np.loadtxt(args.out / "run" / "trajectory_camera.tum"))
+    estimate = CameraPath(np.loadtxt(args.out / "run" / "trajectory_camera.tum"))
     keep = (chunk.t >= estimate.t[0]) & (chunk.t <= estimate.t[-1])
     middle = (estimate.t[0] + estimate.t[-1]) / 2
-    still = Trajectory(np.array([[0, 0, 0, 0, 0, 0, 0, 1.0], [1e3, 0, 0, 0, 0, 0, 0, 1.0]]))
+    still = CameraPath(np.array([[0, 0, 0, 0, 0, 0, 0, 1.0], [1e3, 0, 0, 0, 0, 0, 0, 1.0]]))
     figures = {"contour_points": len(points), "status": summary["status"],
                "tracked_s": round(float(estimate.t[-1] - estimate.t[0]), 4),
                **{k: summary["accuracy"][k] for k in ("ate_mean_mm", "ate_max_mm", "are_mean_deg")},

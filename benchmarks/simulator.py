@@ -10,6 +10,7 @@ import numpy as np
 
 import files
 import harness
+import tables
 
 SEGMENT_M = 0.12
 SECONDS, HOVER_S = 1.5, 30
@@ -81,4 +82,4 @@ def make(bench):
         wanted = [flight for flight in wanted if flight.name in ("indoor_spiral", "indoor_spiral, map 5 mm off")]
     rows = [row(flight.name, bench.once(f"simulator: {flight}", lambda: measure(bench, flight))) for flight in wanted]
     heads = ["flight", "status", "coverage", "ATE mean mm", "max mm", "ARE mean deg", "NEES/6"]
-    return bench.write_page("simulator", {"flights": harness.table(heads, rows)})
+    return bench.write_page("simulator", {"flights": tables.table(heads, rows)})

@@ -1,126 +1,59 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Events of recordings side by side: compare_simulators.py [options] OUT NAME=FOLDER NAME=FOLDER ...
+"""docs/results/simulator-peer.md: the simulator's events beside those of an independent one, on the same flight.
 
-    --contours NAME=FILE.ply    true contours, where they are not in the folder
-    --cloud NAME=FILE.ply       cloud that tells what hides contours, where it is not map_raw.ply of the folder
-    --start S, --end S          stretch of each recording
-
-Prints a table in Markdown and writes OUT/events.png (events of 20 ms of each) and OUT/distributions.svg (times
-between events of a pixel, events per pixel). Needs numpy and h5py.
+room_spiral of the shared recordings is from the other simulator. Its flight is flown in our hall: with the sensor as the
+other has it (no low pass), with the world softened, and with that and the other's contrast threshold. Writes the pictures
+simulators_events.png (events of 20 ms) and simulators_distributions.svg (times between events of a pixel, events per pixel).
 """
-import argparse
+import dataclasses
 import pathlib
-import re
-import struct
-import sys
-import zlib
 
-import h5py
 import numpy as np
 
+import drawing
+import files
+import harness
+import tables
+
+PEER = "room_spiral"
+COMPARED_S, HALL_S = 0.7, 2
 PICTURE_S = 0.02
 COLOURS = ("#1f5fa8", "#3a9a5b", "#c23b22", "#8a56ac")
+RED, BLUE = (200, 40, 30), (30, 90, 190)
+SOFT = ["events.dark_cd_m2=3"]
+THRESHOLD = ["events.threshold_on=0.595", "events.threshold_off=0.595", "events.threshold_sigma=0.071"]
+HOT_QUANTILE = 0.999   # of the pixels; what fires twice as often as that is hot
+LEAST_EVENTS = 1000
 
 
-# ---- files
-
-def read_ply(path):
-    """Columns of the vertices of a binary PLY file."""
-    types = {"float": "f4", "float32": "f4", "double": "f8", "uchar": "u1", "uint8": "u1", "char": "i1", "int8": "i1",
-             "int": "i4", "int32": "i4", "uint": "u4", "short": "i2", "ushort": "u2"}
-    data = path.read_bytes()
-    end = data.index(b"end_header\n") + len(b"end_header\n")
-    header = data[:end].decode().splitlines()
-    if "format binary_little_endian 1.0" not in header:
-        sys.exit(f"{path}: not a little-endian binary PLY file")
-    count, fields, inside = 0, [], False
-    for line in header:
-        words = line.split()
-        if words[:1] == ["element"]:
-            inside = words[1] == "vertex"
-            count = int(words[2]) if inside else count
-        elif words[:1] == ["property"] and inside:
-            fields.append((words[2], "<" + types[words[1]]))
-    return np.frombuffer(data, dtype=fields, count=count, offset=end)
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """A recording, and the files that tell which contours are in view."""
+    name: str
+    folder: pathlib.Path
+    contours: pathlib.Path
+    cloud: pathlib.Path
 
 
-def points_of(table):
-    return np.stack([table["x"], table["y"], table["z"]], axis=1).astype(float)
+class Stretch:
+    """The beginning of a recording, with what is needed to project its contours."""
 
-
-class Camera:
-    """cam0 of a camera chain: pinhole with radial-tangential, equidistant or no distortion."""
-
-    def __init__(self, path):
-        text = path.read_text()
-
-        def numbers(key):
-            return [float(v) for v in re.search(key + r":\s*\[([^\]]*)\]", text)[1].split(",") if v.strip()]
-
-        self.fx, self.fy, self.cx, self.cy = numbers("intrinsics")
-        self.distortion = numbers("distortion_coeffs")
-        self.model = re.search(r"distortion_model:\s*(\S+)", text)[1]
-        self.width, self.height = (int(v) for v in numbers("resolution"))
-        rows = re.search(r"T_cam_imu:\s*\n((?:\s*-\s*\[[^\]]*\]\s*\n?){4})", text)[1]
-        self.T_cam_body = np.array([[float(v) for v in row.split(",")] for row in re.findall(r"\[([^\]]*)\]", rows)])
-
-    def project(self, points):
-        """Pixels, and where they are in front and within the lens's field."""
-        z = points[:, 2]
-        front = z > 0.05
-        x, y = points[:, 0] / np.where(front, z, 1), points[:, 1] / np.where(front, z, 1)
-        r2 = x * x + y * y
-        front &= r2 < 4
-        if self.model == "radtan":
-            k1, k2, p1, p2 = self.distortion[:4]
-            radial = 1 + r2 * (k1 + r2 * k2)
-            x, y = (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-                    y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)
-        elif self.model == "equidistant":
-            r = np.sqrt(r2)
-            angle = np.arctan(r)
-            a2 = angle * angle
-            k = self.distortion
-            scale = np.where(r > 1e-9, angle * (1 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])))) /
-                             np.maximum(r, 1e-9), 1)
-            x, y = x * scale, y * scale
-        return np.stack([self.fx * x + self.cx, self.fy * y + self.cy], axis=1), front
-
-
-def matrices(rows):
-    """T_map_body of rows of a TUM file."""
-    x, y, z, w = rows[:, 4:8].T
-    out = np.zeros((len(rows), 4, 4))
-    out[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], 1)
-    out[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], 1)
-    out[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], 1)
-    out[:, :3, 3] = rows[:, 1:4]
-    out[:, 3, 3] = 1
-    return out
-
-
-class Recording:
-    def __init__(self, name, folder, contours, cloud, start_s, end_s):
-        self.name = name
-        self.camera = Camera(folder / "camchain-imucam.yaml")
-        with h5py.File(folder / "events.h5", "r") as file:
-            t = file["events/t"][:].astype(np.int64)
-            offset = int(file["t_offset"][()]) if "t_offset" in file else 0
-            t += offset
-            truth = np.loadtxt(folder / "groundtruth.tum")
-            begin = int(1e6 * (truth[0, 0] + start_s))
-            end = int(1e6 * min(truth[-1, 0], truth[0, 0] + end_s))
-            part = slice(*np.searchsorted(t, [begin, end]))
-            self.t = t[part]
-            self.x, self.y, self.on = (file["events/" + key][part] for key in ("x", "y", "p"))
-        if len(self.t) < 1000:
-            sys.exit(f"{folder}: fewer than 1000 events from {start_s} s on")
-        self.begin, self.seconds = begin, (end - begin) * 1e-6
+    def __init__(self, source, seconds):
+        self.name = source.name
+        self.camera = files.Camera(source.folder / "camchain-imucam.yaml")
+        truth = np.loadtxt(source.folder / "groundtruth.tum")
+        self.begin = int(1e6 * truth[0, 0])
+        end = int(1e6 * min(truth[-1, 0], truth[0, 0] + seconds))
+        self.seconds = (end - self.begin) * 1e-6
+        self.events = files.Events(source.folder / "events.h5", self.begin, end)
+        if len(self.events.t) < LEAST_EVENTS:
+            raise harness.Failure(f"{source.folder}: fewer than {LEAST_EVENTS} events")
         self.truth_us = truth[:, 0] * 1e6
-        self.T_map_body = matrices(truth)
-        self.contours = read_ply(contours or folder / "contours.ply")
-        self.cloud = points_of(read_ply(cloud or folder / "map_raw.ply"))
+        self.T_map_body = np.tile(np.eye(4), (len(truth), 1, 1))
+        self.T_map_body[:, :3, :3] = files.rotation(truth[:, 4:8])
+        self.T_map_body[:, :3, 3] = truth[:, 1:4]
+        self.contours = files.Ply(source.contours)
+        self.cloud = files.Ply(source.cloud).points()
         self.pixels = self.camera.width * self.camera.height
 
     def T_cam_map(self, t_us):
@@ -128,38 +61,45 @@ class Recording:
         i -= t_us - self.truth_us[i - 1] < self.truth_us[i] - t_us
         return self.camera.T_cam_body @ np.linalg.inv(self.T_map_body[i])
 
+    def between(self, begin_us, end_us):
+        return slice(*np.searchsorted(self.events.t, [begin_us, end_us]))
+
     def pixel_numbers(self):
-        return self.y.astype(np.int64) * self.camera.width + self.x
+        return self.events.y.astype(np.int64) * self.camera.width + self.events.x
 
     def in_order_of_pixels(self):
         """Pixel numbers and times, sorted by both."""
         number = self.pixel_numbers()
-        order = np.lexsort((self.t, number))
-        return number[order], self.t[order]
+        order = np.lexsort((self.events.t, number))
+        return number[order], self.events.t[order]
+
+    def rates(self):
+        """Events a second of each pixel."""
+        return np.bincount(self.pixel_numbers(), minlength=self.pixels) / self.seconds
 
 
 # ---- figures
 
-def gaps(recording):
+def gaps(stretch):
     """Times between events of a pixel, seconds, without the pixels that fire most (hot ones)."""
-    number, t = recording.in_order_of_pixels()
-    counts = np.bincount(number, minlength=recording.pixels)
-    hot = counts > np.quantile(counts, 0.999) * 2
+    number, t = stretch.in_order_of_pixels()
+    counts = np.bincount(number, minlength=stretch.pixels)
+    hot = counts > np.quantile(counts, HOT_QUANTILE) * 2
     same = (number[1:] == number[:-1]) & ~hot[number[1:]]
     return np.diff(t)[same] * 1e-6
 
 
-def lonely_share(recording, window_us=10000, most=400000):
+def lonely_share(stretch, window_us=10000, most=400000):
     """Share of events without any other within 10 ms in the eight pixels around."""
-    number, t = recording.in_order_of_pixels()
+    number, t = stretch.in_order_of_pixels()
+    width = stretch.camera.width
     t = t - t.min()
     stride = int(t.max()) + 4 * window_us
     keys = number * stride + t
     chosen = np.random.default_rng(1).choice(len(keys), min(most, len(keys)), replace=False)
-    chosen = chosen[(number[chosen] % recording.camera.width > 0) &
-                    (number[chosen] % recording.camera.width < recording.camera.width - 1)]
+    chosen = chosen[(number[chosen] % width > 0) & (number[chosen] % width < width - 1)]
     lonely = np.ones(len(chosen), bool)
-    for step in [dy * recording.camera.width + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dx or dy]:
+    for step in [dy * width + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dx or dy]:
         wanted = keys[chosen] + step * stride
         after = np.searchsorted(keys, wanted - window_us)
         lonely &= ~(keys[np.minimum(after, len(keys) - 1)] <= wanted + window_us) | (after >= len(keys))
@@ -192,95 +132,90 @@ def visible(camera, points_cam, pixels, inside, cloud_cam):
     return out
 
 
-def edge_crossings(recording, windows=40, window_s=0.004):
-    """Events per pixel that a visible contour crosses, those of the surroundings taken off; mean speed of the
-    contours along their normals, px/s; their length in view, px."""
-    camera, table = recording.camera, recording.contours
-    points = points_of(table)
+def chained_points(contours):
+    """Points, their tangents, the length that each stands for, and which of them have a next one."""
+    points = contours.points()
     step = np.zeros_like(points)
     step[:-1] = points[1:] - points[:-1]
     length = np.linalg.norm(step, axis=1)
     chained = (length > 1e-6) & (length < 0.1)
-    if "tx" in table.dtype.names:
-        tangent = np.stack([table["tx"], table["ty"], table["tz"]], 1).astype(float)
-    else:
-        tangent = step / np.where(chained, length, 1)[:, None]
-    excess = swept = total_length = speed_length = 0.0
-    moments = recording.begin + 1e6 * (np.linspace(0.05, 0.95, windows) * recording.seconds)
-    for moment in moments:
-        def place(offset_us, what=points):
-            T = recording.T_cam_map(moment + offset_us)
-            in_camera = what @ T[:3, :3].T + T[:3, 3]
-            return in_camera, *camera.project(in_camera)
+    if "tx" in contours.vertices.dtype.names:
+        return points, contours.columns("tx", "ty", "tz"), length, chained
+    return points, step / np.where(chained, length, 1)[:, None], length, chained
 
-        in_camera, pixels, front = place(0)
-        _, along, along_front = place(0, points + 1e-3 * tangent)
-        _, before, _ = place(-2000)
-        _, after, _ = place(2000)
-        inside = (front & along_front & chained & (pixels[:, 0] >= 8) & (pixels[:, 1] >= 8) &
-                  (pixels[:, 0] < camera.width - 8) & (pixels[:, 1] < camera.height - 8))
-        T = recording.T_cam_map(moment)
-        seen = visible(camera, in_camera, pixels, inside, recording.cloud @ T[:3, :3].T + T[:3, 3])
-        direction = (along - pixels)[seen] / 1e-3
-        length_px = np.linalg.norm(direction, axis=1) * length[seen]
-        unit = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-9)[:, None]
-        velocity = (after - before)[seen] / 0.004
-        normal_speed = np.abs(velocity[:, 1] * unit[:, 0] - velocity[:, 0] * unit[:, 1])
-        line = np.zeros((camera.height, camera.width), bool)
-        line[np.rint(pixels[seen, 1]).astype(int), np.rint(pixels[seen, 0]).astype(int)] = True
+
+def moved(points, T):
+    return points @ T[:3, :3].T + T[:3, 3]
+
+
+def edges_in_view(stretch, contours, moment):
+    """Pixels of visible contour points at a moment, their lengths in pixels, their speeds along the normal in px/s."""
+    camera, (points, tangent, length, chained) = stretch.camera, contours
+    T = stretch.T_cam_map(moment)
+    in_camera = moved(points, T)
+    pixels, front = camera.project(in_camera)
+    along, along_front = camera.project(moved(points + 1e-3 * tangent, T))
+    before, after = (camera.project(moved(points, stretch.T_cam_map(moment + offset_us)))[0] for offset_us in (-2000, 2000))
+    inside = (front & along_front & chained & (pixels[:, 0] >= 8) & (pixels[:, 1] >= 8) &
+              (pixels[:, 0] < camera.width - 8) & (pixels[:, 1] < camera.height - 8))
+    seen = visible(camera, in_camera, pixels, inside, moved(stretch.cloud, T))
+    direction = (along - pixels)[seen] / 1e-3
+    scale = np.linalg.norm(direction, axis=1)
+    unit = direction / np.maximum(scale, 1e-9)[:, None]
+    velocity = (after - before)[seen] / 0.004
+    return pixels[seen], scale * length[seen], np.abs(velocity[:, 1] * unit[:, 0] - velocity[:, 0] * unit[:, 1])
+
+
+def edge_crossings(stretch, windows=40, window_s=0.004):
+    """Events per pixel that a visible contour crosses, those of the surroundings taken off; mean speed of the
+    contours along their normals, px/s; their length in view, px."""
+    contours = chained_points(stretch.contours)
+    excess = swept = total_length = speed_length = 0.0
+    moments = stretch.begin + 1e6 * (np.linspace(0.05, 0.95, windows) * stretch.seconds)
+    for moment in moments:
+        pixels, length_px, speed = edges_in_view(stretch, contours, moment)
+        line = np.zeros((stretch.camera.height, stretch.camera.width), bool)
+        line[np.rint(pixels[:, 1]).astype(int), np.rint(pixels[:, 0]).astype(int)] = True
         near = grown(line, 2)
         band = grown(near, 6) & ~grown(near, 3)
-        part = slice(*np.searchsorted(recording.t, [moment - 5e5 * window_s, moment + 5e5 * window_s]))
-        x, y = recording.x[part], recording.y[part]
+        part = stretch.between(moment - 5e5 * window_s, moment + 5e5 * window_s)
+        x, y = stretch.events.x[part], stretch.events.y[part]
         excess += near[y, x].sum() - band[y, x].sum() * near.sum() / max(band.sum(), 1)
-        swept += (length_px * normal_speed).sum() * window_s
+        swept += (length_px * speed).sum() * window_s
         total_length += length_px.sum()
-        speed_length += (length_px * normal_speed).sum()
+        speed_length += (length_px * speed).sum()
     return excess / swept, speed_length / total_length, total_length / len(moments)
 
 
-def figures(recording):
-    counts = np.bincount(recording.pixel_numbers(), minlength=recording.pixels) / recording.seconds
-    spread = np.quantile(counts, [0.1, 0.5, 0.9, 0.99])
-    between = gaps(recording)
-    crossing, speed, length = edge_crossings(recording)
-    rate = len(recording.t) / recording.seconds
-    return [
-        ("seconds", f"{recording.seconds:.2f}"),
-        ("events, Mev/s", f"{rate * 1e-6:.2f}"),
-        ("events per pixel and second, mean", f"{rate / recording.pixels:.2f}"),
-        ("... 10 %, median, 90 %, 99 % of the pixels", ", ".join(f"{v:.1f}" for v in spread)),
-        ("share of on events", f"{np.mean(recording.on):.3f}"),
-        ("visible contours, px", f"{length:.0f}"),
-        ("their mean speed along the normal, px/s", f"{speed:.0f}"),
-        ("events per pixel and pixel of motion", f"{rate / recording.pixels / speed:.4f}"),
-        ("events per edge crossing", f"{crossing:.2f}"),
-        ("time between events of a pixel, ms: 10 %, median, 90 %",
-         ", ".join(f"{1e3 * v:.1f}" for v in np.quantile(between, [0.1, 0.5, 0.9]))),
-        ("... shorter than 0.2 ms", f"{np.mean(between < 2e-4):.4f}"),
-        ("events alone for 10 ms among 3x3 pixels", f"{lonely_share(recording):.3f}"),
-    ]
+def figures(stretch):
+    between = gaps(stretch)
+    crossing, speed, length = edge_crossings(stretch)
+    rate = len(stretch.events.t) / stretch.seconds
+    spread = np.quantile(stretch.rates(), [0.5, 0.9, 0.99])
+    return {
+        "events, Mev/s": f"{rate * 1e-6:.2f}",
+        "events per pixel and second: median, 90 %, 99 % of the pixels": ", ".join(f"{v:.1f}" for v in spread),
+        "share of on events": f"{np.mean(stretch.events.on):.3f}",
+        "visible contours, px": f"{length:.0f}",
+        "their mean speed along the normal, px/s": f"{speed:.0f}",
+        "events per pixel and pixel of motion": f"{rate / stretch.pixels / speed:.4f}",
+        "events per edge crossing, surroundings subtracted": f"{crossing:.2f}",
+        "time between events of a pixel, ms: 10 %, median, 90 %":
+            ", ".join(f"{1e3 * v:.1f}" for v in np.quantile(between, [0.1, 0.5, 0.9])),
+        "of these times, shorter than 0.2 ms": f"{np.mean(between < 2e-4):.4f}",
+        "events alone for 10 ms among 3x3 pixels": f"{lonely_share(stretch):.3f}",
+    }
 
 
 # ---- pictures
 
-def write_png(path, image):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    height, width, _ = image.shape
-    rows = np.concatenate([np.zeros((height, 1), np.uint8), image.reshape(height, -1)], axis=1)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
-                     chunk(b"IDAT", zlib.compress(rows.tobytes(), 9)) + chunk(b"IEND", b""))
-
-
-def event_picture(recording):
+def event_picture(stretch):
     """Events of 20 ms in the middle: on red, off blue, the newest of a pixel wins."""
-    middle = recording.begin + 5e5 * recording.seconds
-    part = slice(*np.searchsorted(recording.t, [middle, middle + 1e6 * PICTURE_S]))
-    image = np.full((recording.camera.height, recording.camera.width, 3), 255, np.uint8)
-    red, blue = np.array([200, 40, 30], np.uint8), np.array([30, 90, 190], np.uint8)
-    image[recording.y[part], recording.x[part]] = np.where(recording.on[part][:, None] > 0, red, blue)
+    middle = stretch.begin + 5e5 * stretch.seconds
+    part = stretch.between(middle, middle + 1e6 * PICTURE_S)
+    image = np.full((stretch.camera.height, stretch.camera.width, 3), 255, np.uint8)
+    colours = np.array([BLUE, RED], np.uint8)
+    image[stretch.events.y[part], stretch.events.x[part]] = colours[(stretch.events.on[part] > 0).astype(int)]
     return image
 
 
@@ -290,74 +225,57 @@ def side_by_side(pictures):
     return np.concatenate(padded, axis=1)[:, :-8]
 
 
-def svg_panel(left, title, unit, edges, curves):
+def draw_shares(svg, left, title, unit, edges, curves):
     """Shares per bin over a logarithmic axis."""
     width, height, top = 380, 220, 40
     most = max(max(c) for c in curves)
-    out = [f'<text x="{left}" y="20" font-size="14">{title}</text>',
-           f'<rect x="{left}" y="{top}" width="{width}" height="{height}" fill="none" stroke="#888"/>']
+    svg.text(left, 20, title, size=14)
+    svg.frame(left, top, width, height)
     low, high = np.log10(edges[0]), np.log10(edges[-1])
     for decade in range(int(np.ceil(low)), int(np.floor(high)) + 1):
         at = left + width * (decade - low) / (high - low)
-        out.append(f'<line x1="{at:.1f}" y1="{top}" x2="{at:.1f}" y2="{top + height}" stroke="#ddd"/>')
-        out.append(f'<text x="{at:.1f}" y="{top + height + 16}" text-anchor="middle">{10.0 ** decade:g}</text>')
-    out.append(f'<text x="{left + width / 2}" y="{top + height + 34}" text-anchor="middle">{unit}</text>')
+        svg.line(at, top, at, top + height, "#ddd")
+        svg.text(at, top + height + 16, f"{10.0 ** decade:g}", "middle")
+    svg.text(left + width / 2, top + height + 34, unit, "middle")
     middles = 0.5 * (np.log10(edges[1:]) + np.log10(edges[:-1]))
     for curve, colour in zip(curves, COLOURS):
-        line = " ".join(f"{left + width * (m - low) / (high - low):.1f},{top + height * (1 - 0.95 * v / most):.1f}"
-                        for m, v in zip(middles, curve))
-        out.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>')
-    return out
+        svg.curve(left + width * (middles - low) / (high - low), top + height * (1 - 0.95 * np.asarray(curve) / most), colour)
 
 
-def write_distributions(path, recordings):
-    between_edges = np.logspace(-4, 0.5, 46)
-    count_edges = np.logspace(-0.5, 3, 36)
-    between, counts = [], []
-    for recording in recordings:
-        histogram = np.histogram(gaps(recording), between_edges)[0]
-        between.append(histogram / histogram.sum())
-        per_pixel = np.bincount(recording.pixel_numbers(), minlength=recording.pixels) / recording.seconds
-        counts.append(np.histogram(per_pixel, count_edges)[0] / recording.pixels)
-    out = ['<svg xmlns="http://www.w3.org/2000/svg" width="880" height="310" font-family="sans-serif" font-size="12">',
-           '<rect width="880" height="310" fill="white"/>']
-    out += svg_panel(30, "Time between events of a pixel", "s", between_edges, between)
-    out += svg_panel(470, "Events per pixel", "1/s", count_edges, counts)
-    for i, (recording, colour) in enumerate(zip(recordings, COLOURS)):
-        out.append(f'<text x="{850 - 90 * (len(recordings) - 1 - i)}" y="32" text-anchor="end" fill="{colour}">{recording.name}</text>')
-    path.write_text("\n".join(out) + "\n</svg>\n")
+def draw_distributions(path, stretches):
+    between_edges, rate_edges = np.logspace(-4, 0.5, 46), np.logspace(-0.5, 3, 36)
+    histograms = [np.histogram(gaps(s), between_edges)[0] for s in stretches]
+    svg = drawing.Svg(880, 310)
+    draw_shares(svg, 30, "Time between events of a pixel", "s", between_edges, [h / h.sum() for h in histograms])
+    draw_shares(svg, 470, "Events per pixel", "1/s", rate_edges,
+                [np.histogram(s.rates(), rate_edges)[0] / s.pixels for s in stretches])
+    for i, (stretch, colour) in enumerate(zip(stretches, COLOURS)):
+        svg.text(850 - 90 * (len(stretches) - 1 - i), 32, stretch.name, "end", fill=colour)
+    svg.write(path)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("recordings", nargs="+", metavar="NAME=FOLDER")
-    parser.add_argument("--contours", action="append", default=[], metavar="NAME=FILE")
-    parser.add_argument("--cloud", action="append", default=[], metavar="NAME=FILE")
-    parser.add_argument("--start", type=float, default=0.0)
-    parser.add_argument("--end", type=float, default=1e9)
-    options = parser.parse_args()
+# ---- the page
 
-    def named(values):
-        for value in values:
-            if "=" not in value:
-                sys.exit(f"{value}: write NAME=PATH")
-        return {name: pathlib.Path(path) for name, path in (value.split("=", 1) for value in values)}
+def sources(bench):
+    peer = bench.peer(PEER)
+    flight = ["camera.size=vga", "lidar.on=true", "events.bandwidth_hz_per_cd_m2=0", "trajectory.kind=file",
+              f"trajectory.file={peer.truth}"]
 
-    if len(options.recordings) > len(COLOURS):
-        sys.exit(f"{len(COLOURS)} recordings at most")
-    contours, clouds = named(options.contours), named(options.cloud)
-    recordings = [Recording(name, folder, contours.get(name), clouds.get(name), options.start, options.end)
-                  for name, folder in named(options.recordings).items()]
-    options.out.mkdir(parents=True, exist_ok=True)
-    columns = [figures(recording) for recording in recordings]
-    print("| | " + " | ".join(recording.name for recording in recordings) + " |")
-    print("|---|" + "---|" * len(recordings))
-    for rows in zip(*columns):
-        print(f"| {rows[0][0]} | " + " | ".join(value for _, value in rows) + " |")
-    write_png(options.out / "events.png", side_by_side([event_picture(r) for r in recordings]))
-    write_distributions(options.out / "distributions.svg", recordings)
+    def flown(name, seconds, *settings):
+        made = bench.simulated("indoor_spiral", seconds, [*flight, *settings], f"peer_flight_{name}")
+        return Source(name, made.folder, made.contours, made.folder / "map_raw.ply")
+
+    out = [flown("hall", HALL_S), flown("softened", COMPARED_S, "world.texture_contrast=0.5", *SOFT),
+           Source("peer", peer.folder, peer.contours, bench.shared / "data/peer/maps/room_map_raw.ply"),
+           flown("thresholds", COMPARED_S, *SOFT, *THRESHOLD)]
+    return out[::3] if bench.quick else out
 
 
-if __name__ == "__main__":
-    main()
+def make(bench):
+    stretches = [Stretch(source, COMPARED_S) for source in sources(bench)]
+    columns = {s.name: bench.once(f"simulator-peer: {s.name}", lambda: figures(s)) for s in stretches}
+    rows = [[what, *(column[what] for column in columns.values())] for what in columns[stretches[0].name]]
+    drawing.write_png(bench.image("simulators_events.png"), side_by_side([event_picture(s) for s in stretches[:3]]))
+    draw_distributions(bench.image("simulators_distributions.svg"), stretches[:3])
+    return bench.write_page("simulator-peer",
+                            {"statistics": tables.table([f"first {COMPARED_S} s", *columns], rows)})

@@ -6,7 +6,7 @@ a row for each variant and a column for each recording (or the other way), and t
 """
 
 
-def tables(markdown):
+def read(markdown):
     """Tables by the heading above them, each a list of rows: {heading: [{column: cell}]}."""
     found, heading, columns = {}, "", None
     for line in markdown.splitlines():
@@ -16,7 +16,7 @@ def tables(markdown):
             columns = None
         elif columns is None:
             columns = cells_of(line)
-        elif set(line) - set("|-: "):
+        elif not set(line) <= set("|-:"):
             found.setdefault(heading, []).append(dict(zip(columns, cells_of(line))))
     return found
 
@@ -26,21 +26,19 @@ def cells_of(line):
 
 
 def table(header, rows):
-    """A Markdown table from a list of column names and lists of cells."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join(lines + ["| " + " | ".join(map(str, row)) + " |" for row in rows]) + "\n"
+    """Lines of a Markdown table from names of columns and lists of cells."""
+    return ["| " + " | ".join(header) + " |", "|" + "---|" * len(header),
+            *("| " + " | ".join(map(str, row)) + " |" for row in rows)]
 
 
-def pivot(markdown, figures, key="variant", leave_out=(), by_heading=False):
-    """One table from many: `figures` (names of columns) in each cell, a row for each value of `key` and a column for
-    each heading; with `by_heading` the other way. Rows named in `leave_out` are left out."""
-    cells, names, headings = {}, [], []
-    for heading, rows in tables(markdown).items():
-        headings.append(heading)
-        for row in rows:
-            if row[key] not in leave_out:
-                names += [] if row[key] in names else [row[key]]
-                cells[row[key], heading] = ", ".join(row[figure] for figure in figures)
-    if by_heading:
-        return table(["recording", *names], [[h, *(cells.get((n, h), "-") for n in names)] for h in headings])
-    return table([key, *headings], [[n, *(cells.get((n, h), "-") for h in headings)] for n in names])
+def pivot(measured, cell, key="variant"):
+    """One table from {recording: {variant: row}}: a row for each variant, a column for each recording, `cell(row)` in each."""
+    names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
+    return table([key, *measured], [[n, *(cell(rows[n]) if n in rows else "-" for rows in measured.values())] for n in names])
+
+
+def transposed(measured, cell, key="recording"):
+    """As `pivot`, the other way: a row for each recording, a column for each variant."""
+    names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
+    return table([key, *names], [[recording, *(cell(rows[n]) if n in rows else "-" for n in names)]
+                                 for recording, rows in measured.items()])

@@ -6,10 +6,11 @@ import drawing
 import harness
 import tables
 
-FLIGHTS = [("indoor_spiral", "camera.size=720p"), ("people", "camera.size=vga"), ("hdr_window", "camera.size=vga"),
-           ("turning_3", "camera.size=vga"), ("landing", "camera.size=vga"), ("outdoor_spiral", "camera.size=vga"),
-           ("speed_1", "camera.size=vga"), ("speed_3", "camera.size=vga")]
-FLIGHT_S = 1.5
+FLIGHT_S, LANDING_S = 1.5, 8
+# Name, scenario, size of the image, seconds.
+FLIGHTS = [("indoor_spiral_720p", "indoor_spiral", "720p", FLIGHT_S), ("landing_touchdown", "landing", "vga", LANDING_S),
+           *((name, name, "vga", FLIGHT_S) for name in ("people", "hdr_window", "turning_3", "landing", "outdoor_spiral",
+                                                        "speed_1", "speed_3"))]
 MOVING = {"fan": ("camera.size=vga",), "people": ("camera.size=vga",), "car": tuple(harness.TINY)}
 BAR, BAR_WEAK, BAR_END_MM = "#1f77d0", "#a9c4e2", 4
 
@@ -31,9 +32,9 @@ def make_fusion(bench):
     begins = ["EKF (full"] if bench.quick else []
     shared = {recording.name: variants(bench, "fusion", recording, *begins) for recording in bench.peers()}
     flown = {}
-    for scenario, size in FLIGHTS[1:2] if bench.quick else FLIGHTS:
-        name = scenario + ("_720p" if size.endswith("720p") else "")
-        flown[name] = variants(bench, "fusion", bench.simulated(scenario, FLIGHT_S, (size,), name), *begins)
+    for name, scenario, size, seconds in FLIGHTS[2:3] if bench.quick else FLIGHTS:
+        flight = bench.simulated(scenario, seconds, (f"camera.size={size}",), name)
+        flown[name] = variants(bench, "fusion", flight, *begins)
     cells = {"mean ATE mm, mean ARE deg": errors,
              "NEES/6, velocity mm/s, jitter mm": lambda r: f"{r['NEES/6']}, {r['velocity mm/s']}, {r['jitter mm']}",
              "RTE over 10 and 100 ms, mm": lambda r: f"{r['RTE 10 ms mm']}, {r['RTE 100 ms mm']}"}
@@ -86,7 +87,10 @@ def make_relocalization(bench):
 def make_faults(bench):
     few = ["--only", "room_720p", "--replays", 12] if bench.quick else []
     printed = bench.once("faults", lambda: bench.run("bench", "faults", bench.shared / "data/peer", *few))
-    return bench.write_page("faults", {"replays": printed.splitlines()})
+    rows = tables.read(printed)[""]
+    shown = [column for column in rows[0] if column not in ("updates", "in replays", "not finite")]
+    lines = [*tables.table(shown, [[row[column] for column in shown] for row in rows]), "", printed.strip().splitlines()[-1]]
+    return bench.write_page("faults", {"replays": lines})
 
 
 def make_calibration(bench):

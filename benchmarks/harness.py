@@ -126,7 +126,7 @@ class Bench:
     # ---- pages
 
     def write_page(self, name, figures, note=""):
-        """Puts figures (a name and Markdown lines each) into the places that docs/results/NAME.md has for them, between
+        """Puts figures (a name and Markdown lines each) into the places that the page of that name has for them, between
         `<!-- figures: X -->` and `<!-- end -->`, and says on top which command made them, from which commit."""
         path = self.docs / "results" / f"{name}.md"
         if not path.exists():

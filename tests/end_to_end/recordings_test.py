@@ -98,7 +98,7 @@ class RecordingsTest(unittest.TestCase):
 
     def test_real_hexacopter_from_events_alone(self):
         chunk = SHARED / "data/real/mvsec_indoor_flying1_chunk"
-        result = subprocess.run([sys.executable, str(SOURCE / "scripts/mvsec_chunk.py"), EVPOSE, str(chunk),
+        result = subprocess.run([sys.executable, str(SOURCE / "benchmarks/mvsec_chunk.py"), EVPOSE, str(chunk),
                                  str(self.out), "--json"], capture_output=True, text=True, timeout=300)
         self.assertEqual(result.returncode, 0, result.stderr)
         figures = json.loads(result.stdout)

@@ -45,7 +45,7 @@ class BenchTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.root = pathlib.Path(folder.name)
         (self.root / "docs/results").mkdir(parents=True)
-        self.page = self.root / "docs/results/page.md"
+        self.page = self.root / "docs/results" / "page.md"
         self.page.write_text(PAGE)
         (self.root / "evpose").write_text("#!/bin/sh\necho told \"$@\"\n")
         (self.root / "evpose").chmod(0o755)

@@ -14,7 +14,7 @@ namespace evpose {
 namespace {
 
 constexpr float kLink_m = 0.035F;         // true points so near to each other, in line, are of one edge
-constexpr float kSameEdge_m = 0.003F;     // ... and those so near across it
+constexpr float kSameEdge_m = 0.003F;     // if they are so near across it
 constexpr double kOutlierSigma = 3.5;     // one in 450 by chance
 constexpr float kFurthestRival_m = 0.3F;  // parallel edges further apart do not disturb each other
 
@@ -177,69 +177,115 @@ struct Tally {
   }
 };
 
+/// Tallies of all contours, and of creases and boundaries by themselves.
+struct Tallies {
+  Tally all, crease, boundary;
+
+  Tally* of_kind(ContourKind kind) {
+    return kind == ContourKind::crease ? &crease : kind == ContourKind::boundary ? &boundary : nullptr;
+  }
+};
+
+/// The contours that registration may use: edges of surfaces.
+ContourMap edges_only(const ContourMap& map) {
+  ContourMap out;
+  out.anchor = map.anchor;
+  for (const ContourPoint& p : map.points)
+    if (!is_view_dependent(p.kind)) out.points.push_back(p);
+  return out;
+}
+
+/// Which places a cloud shows; without a cloud all of them count as seen.
+class SeenPlaces {
+ public:
+  SeenPlaces(const PointCloud* cloud, const Eigen::Vector3d& anchor, const MapScoreConfig& config)
+      : points_(points_of(cloud, anchor)),
+        // Of a sparse cloud six points of the two surfaces lie further around.
+        radius_(std::max(static_cast<float>(config.seen_radius_m), 5 * typical_spacing(points_))),
+        grid_(points_, radius_),
+        needed_(cloud != nullptr ? config.seen_points : 0) {}
+
+  bool shows(const Eigen::Vector3f& x) const {
+    if (needed_ <= 0) return true;
+    int near = 0;
+    grid_.for_candidates(x, [&](std::uint32_t j) { near += (points_[j] - x).norm() <= radius_ ? 1 : 0; });
+    return near >= needed_;
+  }
+
+ private:
+  static std::vector<Eigen::Vector3f> points_of(const PointCloud* cloud, const Eigen::Vector3d& anchor) {
+    std::vector<Eigen::Vector3f> out;
+    if (cloud != nullptr)
+      for (const auto& p : cloud->points)
+        out.push_back((cloud->anchor - anchor + p.cast<double>()).cast<float>());
+    return out;
+  }
+
+  std::vector<Eigen::Vector3f> points_;
+  float radius_;
+  PointGrid grid_;
+  int needed_;
+};
+
+/// Length of the edge that each point is part of.
+std::vector<double> edge_lengths(const ContourMap& map, const std::vector<std::uint32_t>& edges) {
+  std::vector<double> of_root(edges.size(), 0), out(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    of_root[edges[i]] += static_cast<double>(map.points[i].length);
+  for (std::size_t i = 0; i < edges.size(); ++i) out[i] = of_root[edges[i]];
+  return out;
+}
+
+/// Holds the true contours that count against the built ones.
+void judge_recall(const ContourMap& truth, const std::vector<Eigen::Vector3f>& at, const Matcher& in_built,
+                  const SeenPlaces& seen, const MapScoreConfig& config, Tallies& tallies, MapScore& out) {
+  const auto edges = edges_of(truth, at);
+  const auto lengths = edge_lengths(truth, edges);
+  const auto rivals = rivals_of(truth, at, edges);
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const ContourPoint& p = truth.points[i];
+    const auto weight = static_cast<double>(p.length);
+    if (lengths[i] < config.long_m) {
+      out.short_m += weight;
+      continue;
+    }
+    if (!seen.shows(at[i])) {
+      out.unseen_m += weight;
+      continue;
+    }
+    const Match match = in_built.nearest(at[i], p.tangent);
+    tallies.all.truth(weight, match);
+    count(out.by_length, lengths[i], weight, match.across_m);
+    count(out.by_rival, static_cast<double>(rivals[i]), weight, match.across_m);
+    if (!config.flown.empty())
+      count(out.by_way, distance_m(config.flown, truth.position(i)), weight, match.across_m);
+    if (Tally* tally = tallies.of_kind(p.kind)) tally->truth(weight, match);
+  }
+}
+
 }  // namespace
 
 MapScore score_map(const ContourMap& judged, const ContourMap& truth, const PointCloud* cloud,
                    const MapScoreConfig& config) {
-  ContourMap built;
-  built.anchor = judged.anchor;
-  for (const ContourPoint& p : judged.points)
-    if (!is_view_dependent(p.kind)) built.points.push_back(p);
+  const ContourMap built = edges_only(judged);
   const auto of_built = positions(built, truth.anchor), of_truth = positions(truth, truth.anchor);
-  Tally all, crease, boundary;
-  const auto of_kind = [&](ContourKind kind) -> Tally* {
-    return kind == ContourKind::crease ? &crease : kind == ContourKind::boundary ? &boundary : nullptr;
-  };
   const Matcher in_truth(truth, of_truth, config), in_built(built, of_built, config);
+  Tallies tallies;
   for (std::size_t i = 0; i < of_built.size(); ++i) {
     const ContourPoint& p = built.points[i];
     const Match match = in_truth.nearest(of_built[i], p.tangent);
-    all.built(p, match);
-    if (Tally* tally = of_kind(p.kind)) tally->built(p, match);
+    tallies.all.built(p, match);
+    if (Tally* tally = tallies.of_kind(p.kind)) tally->built(p, match);
   }
-  std::vector<Eigen::Vector3f> seen;
-  if (cloud != nullptr)
-    for (const auto& p : cloud->points)
-      seen.push_back((cloud->anchor - truth.anchor + p.cast<double>()).cast<float>());
-  // Of a sparse cloud six points of the two surfaces lie further around.
-  const float radius = std::max(static_cast<float>(config.seen_radius_m), 5 * typical_spacing(seen));
-  const PointGrid seen_grid(seen, radius);
-  const auto edges = edges_of(truth, of_truth);
-  std::vector<double> lengths(of_truth.size(), 0);
-  for (std::size_t i = 0; i < edges.size(); ++i)
-    lengths[edges[i]] += static_cast<double>(truth.points[i].length);
-  const auto rivals = rivals_of(truth, of_truth, edges);
+  const SeenPlaces seen(cloud, truth.anchor, config);
   MapScore out;
-  for (std::size_t i = 0; i < of_truth.size(); ++i) {
-    const ContourPoint& p = truth.points[i];
-    const auto weight = static_cast<double>(p.length);
-    const double length = lengths[edges[i]];
-    if (length < config.long_m) {
-      out.short_m += weight;
-      continue;
-    }
-    int near = 0;
-    if (cloud != nullptr)
-      seen_grid.for_candidates(
-          of_truth[i], [&](std::uint32_t j) { near += (seen[j] - of_truth[i]).norm() <= radius ? 1 : 0; });
-    if (cloud != nullptr && near < config.seen_points) {
-      out.unseen_m += weight;
-      continue;
-    }
-    const Match match = in_built.nearest(of_truth[i], p.tangent);
-    all.truth(weight, match);
-    count(out.by_length, length, weight, match.across_m);
-    count(out.by_rival, static_cast<double>(rivals[i]), weight, match.across_m);
-    if (!config.flown.empty())
-      count(out.by_way, distance_m(config.flown, truth.position(i)), weight, match.across_m);
-    if (Tally* tally = of_kind(p.kind)) tally->truth(weight, match);
-  }
+  judge_recall(truth, of_truth, in_built, seen, config, tallies, out);
   finish(out.by_length);
   finish(out.by_rival);
   finish(out.by_way);
-  out.all = all.finish();
-  out.crease = crease.finish();
-  out.boundary = boundary.finish();
+  out.all = tallies.all.finish();
+  out.crease = tallies.crease.finish();
+  out.boundary = tallies.boundary.finish();
   return out;
 }
 

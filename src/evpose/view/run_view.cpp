@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/view/run_view.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string_view>
 
@@ -69,6 +71,59 @@ class Row {
   bool sound_ = true;
 };
 
+/// From the newest event to the pose; NAN where the row does not tell.
+double delay_ms(Row times) {
+  const double sum = times.number("predict_ms") + times.number("choose_ms") + times.number("register_ms") +
+                     times.number("fuse_ms");
+  return times.sound() ? sum : NAN;
+}
+
+double number_of_health(std::string_view name) {
+  const auto found = std::find(std::begin(kHealths), std::end(kHealths), name);
+  return found == std::end(kHealths) ? 0 : static_cast<double>(found - std::begin(kHealths));
+}
+
+/// The largest sigma of the rotation, degrees.
+double rotation_sigma_deg(Row& row) {
+  double variance = 0;
+  for (const char* key : {"cov_rx_rx", "cov_ry_ry", "cov_rz_rz"})
+    variance = std::max(variance, row.number(key));
+  return std::sqrt(variance) * 180 / M_PI;
+}
+
+/// `since_s`: since the run's first row. `span_s`: since the row before, whose events are counted.
+ViewRow read_row(Row& row, double since_s, double span_s, double delay) {
+  return {since_s,
+          row.number("x_m"),
+          row.number("y_m"),
+          row.number("z_m"),
+          row.number("qx"),
+          row.number("qy"),
+          row.number("qz"),
+          row.number("qw"),
+          row.number("vx_m_s"),
+          row.number("vy_m_s"),
+          row.number("vz_m_s"),
+          row.number("cov_x_x"),
+          row.number("cov_x_y"),
+          row.number("cov_x_z"),
+          row.number("cov_y_y"),
+          row.number("cov_y_z"),
+          row.number("cov_z_z"),
+          rotation_sigma_deg(row),
+          number_of_health(row.word("health")),
+          span_s > 0 ? 1e-6 * row.number("events_read") / span_s : 0,
+          delay,
+          row.number("points_matched"),
+          row.number("points"),
+          row.number("gyro_bias_x_rad_s"),
+          row.number("gyro_bias_y_rad_s"),
+          row.number("gyro_bias_z_rad_s"),
+          row.number("accel_bias_x_m_s2"),
+          row.number("accel_bias_y_m_s2"),
+          row.number("accel_bias_z_m_s2")};
+}
+
 }  // namespace
 
 Expected<std::vector<ViewRow>> read_run(const std::string& folder, std::size_t most) {
@@ -87,51 +142,8 @@ Expected<std::vector<ViewRow>> read_run(const std::string& folder, std::size_t m
     Row row(states, states.rows[i]);
     const double t = row.number("t_s");
     if (i == 0) first = before = t;
-    double delay_ms = NAN;
-    if (timed) {
-      Row times(latency, latency.rows[i]);
-      delay_ms = times.number("predict_ms") + times.number("choose_ms") + times.number("register_ms") +
-                 times.number("fuse_ms");
-      if (!times.sound()) delay_ms = NAN;
-    }
-    double health = 0;
-    const std::string_view name = row.word("health");
-    for (int k = 0; k < 5; ++k)
-      if (name == kHealths[k]) health = k;
-    const double span = (t - before) / static_cast<double>(step);
-    const double rate = span > 0 ? 1e-6 * row.number("events_read") / span : 0;
-    double rotation = 0;
-    for (const char* key : {"cov_rx_rx", "cov_ry_ry", "cov_rz_rz"})
-      rotation = std::max(rotation, row.number(key));
-    out.push_back({t - first,
-                   row.number("x_m"),
-                   row.number("y_m"),
-                   row.number("z_m"),
-                   row.number("qx"),
-                   row.number("qy"),
-                   row.number("qz"),
-                   row.number("qw"),
-                   row.number("vx_m_s"),
-                   row.number("vy_m_s"),
-                   row.number("vz_m_s"),
-                   row.number("cov_x_x"),
-                   row.number("cov_x_y"),
-                   row.number("cov_x_z"),
-                   row.number("cov_y_y"),
-                   row.number("cov_y_z"),
-                   row.number("cov_z_z"),
-                   std::sqrt(rotation) * 180 / M_PI,
-                   health,
-                   rate,
-                   delay_ms,
-                   row.number("points_matched"),
-                   row.number("points"),
-                   row.number("gyro_bias_x_rad_s"),
-                   row.number("gyro_bias_y_rad_s"),
-                   row.number("gyro_bias_z_rad_s"),
-                   row.number("accel_bias_x_m_s2"),
-                   row.number("accel_bias_y_m_s2"),
-                   row.number("accel_bias_z_m_s2")});
+    const double span_s = (t - before) / static_cast<double>(step);
+    out.push_back(read_row(row, t - first, span_s, timed ? delay_ms(Row(latency, latency.rows[i])) : NAN));
     if (!row.sound())
       return Error{path, text("line ", i + 2, " is not as evpose writes it"), "give a complete run folder"};
     before = t;

@@ -41,7 +41,9 @@ const std::vector<Variant> kAblation{
     {"without IMU", false, {}},
     {"the paper's field", true, {"field=exponential"}},
     {"the paper's field without IMU (STPE)", false, {"field=exponential"}},
-    {"the paper's field without IMU and noise filter", false, {"field=exponential", "events.filter.on=false"}},
+    {"the paper's field without IMU and noise filter",
+     false,
+     {"field=exponential", "events.filter.on=false"}},
 };
 
 struct Figures {

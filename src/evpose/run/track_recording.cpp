@@ -41,6 +41,22 @@ Status check_units(const Recording& recording, const std::vector<TimedPose>& tru
   return check_gyro_against(truth, samples, recording.imu_path);
 }
 
+/// The map of the request, or the recording's own.
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
+                                                     const Recording& recording) {
+  std::string path = request.map;
+  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
+  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
+  auto map = read_contour_map(path);
+  if (!map) return map.error();
+  if (!request.occluders.empty()) {
+    auto mesh = read_ply_mesh(request.occluders, map->anchor);
+    if (!mesh) return mesh.error();
+    map->occluders = std::move(*mesh);
+  }
+  return std::make_shared<const ContourMap>(std::move(*map));
+}
+
 /// Reads both streams side by side; the IMU runs ahead so that no event has to wait for it.
 Status feed(const Recording& recording, const RunConfig& config, Tracker& tracker, Progress& progress) {
   auto reader = open_events(recording, 1e-3 * config.packet_ms);
@@ -113,30 +129,30 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
   return config;
 }
 
-Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
-                                                     const Recording& recording) {
-  std::string path = request.map;
-  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
-  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
-  auto map = read_contour_map(path);
+Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,
+                            std::vector<TimedPose> truth) {
+  auto map = load_map(request, recording);
   if (!map) return map.error();
-  if (!request.occluders.empty()) {
-    auto mesh = read_ply_mesh(request.occluders, map->anchor);
-    if (!mesh) return mesh.error();
-    map->occluders = std::move(*mesh);
-  }
-  return std::make_shared<const ContourMap>(std::move(*map));
+  auto camera = make_camera(recording.camera);
+  if (!camera) return Error{recording.calibration_path, camera.error().what, camera.error().fix};
+  TrackJob job;
+  job.config = config;
+  const auto start = choose_start(request.init, recording, truth,
+                                  {request.init_sigma[0], request.init_sigma[1]}, &job.config.tracker.fusion);
+  if (!start) return start.error();
+  job.recording = recording;
+  job.map = *map;
+  job.truth = std::move(truth);
+  job.start = *start;
+  job.setup = {*camera, recording.T_cam_body.inverse(),
+               recording.has_imu ? MotionModel::imu : MotionModel::constant_velocity, recording.imu_noise,
+               *map};
+  return job;
 }
 
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config) {
-  TrackJob job;
-  job.config = config;
   const auto recording = open_recording(request.recording, request.calibration);
   if (!recording) return recording.error();
-  auto map = load_map(request, *recording);
-  if (!map) return map.error();
-  auto camera = make_camera(recording->camera);
-  if (!camera) return Error{recording->calibration_path, camera.error().what, camera.error().fix};
   std::vector<TimedPose> truth;
   if (!recording->groundtruth_path.empty()) {
     auto read = read_groundtruth(*recording);
@@ -145,17 +161,7 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   }
   if (recording->has_imu)
     if (auto ok = check_units(*recording, truth); !ok) return ok.error();
-  const auto start = choose_start(request.init, *recording, truth,
-                                  {request.init_sigma[0], request.init_sigma[1]}, &job.config.tracker.fusion);
-  if (!start) return start.error();
-  job.recording = *recording;
-  job.map = *map;
-  job.truth = std::move(truth);
-  job.start = *start;
-  job.setup = {*camera, recording->T_cam_body.inverse(),
-               recording->has_imu ? MotionModel::imu : MotionModel::constant_velocity, recording->imu_noise,
-               *map};
-  return job;
+  return make_job(request, config, *recording, std::move(truth));
 }
 
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker) {

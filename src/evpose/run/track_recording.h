@@ -46,8 +46,9 @@ struct TrackJob {
   StartState start;
   TrackerSetup setup;
 };
-/// The map of the request, or the recording's own.
-Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request, const Recording& recording);
+/// The job on a recording that is known, with the map of the request or the recording's own.
+Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,
+                            std::vector<TimedPose> truth);
 /// Reads and checks everything but the events.
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
 /// What the run folder is told at the end; without times and memory.

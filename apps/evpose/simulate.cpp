@@ -96,10 +96,10 @@ int simulate(const SimulateRequest& request) {
       100 * static_cast<double>(cause[2]) / std::max(1.0, static_cast<double>(made->read_out.delivered)),
       100 * static_cast<double>(cause[3]) / std::max(1.0, static_cast<double>(made->read_out.delivered)),
       made->contour_points, made->frames, wall_s, wall_s / made->duration_s, request.threads);
-  const sim::FilmCounts& film = made->film;
-  log_detail(text("film: ", film.blocks, " blocks, ", film.samples, " samples of pixels, ",
-                  100.0 * static_cast<double>(film.open_samples) / static_cast<double>(film.samples),
-                  " % of them at borders, ", film.knots, " looks between"));
+  const sim::PixelIntegratorCounts& work = made->integrator;
+  log_detail(text("integrator: ", work.blocks, " blocks, ", work.samples, " samples of pixels, ",
+                  100.0 * static_cast<double>(work.mixed_samples) / static_cast<double>(work.samples),
+                  " % of them mixed, ", work.knots, " knots between samples"));
   return 0;
 }
 

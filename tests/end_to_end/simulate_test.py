@@ -81,7 +81,7 @@ class Simulate(unittest.TestCase):
                      "trajectory.centre_z_m=0.6", "trajectory.size_forward_m=0.1", "trajectory.size_left_m=0.1",
                      "trajectory.size_up_m=0.1")
         self.refused("events.threshold_on", "events.threshold_on=-0.2")
-        self.refused("px/s", "film.fastest_px_s=2")
+        self.refused("px/s", "integrator.max_flow_px_s=2")
         self.refused("events.treshold_on", "events.treshold_on=0.2")
         self.refused("do not fit", "frames.rate_hz=30", "frames.exposure_ms=50")
 

@@ -9,9 +9,9 @@
 
 namespace evpose::sim {
 
-/// Looks along a flight before it is rendered. Errors, with the time: the camera is inside of something or
-/// nearer than 3 cm to it; the picture would move faster than `fastest_px_s`.
+/// Checks a flight before it is rendered. Errors, with the time: the camera is inside of a body or nearer
+/// than 3 cm to a surface; the optical flow exceeds `max_flow_px_s`.
 Status check_flight(const RayCaster& rays, const CameraPath& path, double duration_s, double focal_px,
-                    double fastest_px_s);
+                    double max_flow_px_s);
 
 }  // namespace evpose::sim

@@ -11,8 +11,8 @@ namespace evpose::sim {
 /// Gravity in the map frame, m/s^2.
 inline Eigen::Vector3d gravity_map() { return {0, 0, -9.81}; }
 
-/// Where the body is and how it moves, at one instant.
-struct Motion {
+/// Pose of the body and its derivatives at one instant.
+struct BodyMotion {
   Pose T_map_body;
   Eigen::Vector3d velocity;              ///< of the body's origin, map frame, m/s
   Eigen::Vector3d acceleration;          ///< map frame, m/s^2
@@ -20,7 +20,7 @@ struct Motion {
   Eigen::Vector3d angular_acceleration;  ///< body frame, rad/s^2
 };
 
-/// Where the camera is and how it moves.
+/// Pose and velocity of the camera at one instant.
 struct CameraMotion {
   Pose T_map_cam;
   Eigen::Vector3d velocity;  ///< of the camera's centre, camera frame, m/s

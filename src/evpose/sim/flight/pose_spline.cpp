@@ -11,7 +11,7 @@
 namespace evpose::sim {
 namespace {
 
-constexpr int kOrder = 6;   // control poses that matter at a time
+constexpr int kOrder = 6;   // control poses that influence one instant
 constexpr int kBefore = 2;  // of these, before the knot at or before that time
 
 /// Of the six uniform quintic basis functions, and their derivatives by u in [0, 1).
@@ -42,7 +42,7 @@ std::pair<std::ptrdiff_t, double> locate(double t_s, double knot_s) {
 
 }  // namespace
 
-void Turning::turn(const Eigen::Vector3d& axis, double angle, double angle_1, double angle_2) {
+void AngularMotion::rotate(const Eigen::Vector3d& axis, double angle, double angle_1, double angle_2) {
   const Eigen::Quaterniond step = so3::exp(angle * axis), back = step.conjugate();
   q = q * step;
   rate = back * rate + angle_1 * axis;
@@ -66,13 +66,13 @@ std::size_t PoseSpline::index(std::ptrdiff_t k) const {
       std::clamp(k, std::ptrdiff_t{0}, static_cast<std::ptrdiff_t>(control_.size()) - 1));
 }
 
-Motion PoseSpline::at(double t_s) const {
-  // Further out nothing changes any more.
+BodyMotion PoseSpline::at(double t_s) const {
+  // Beyond this all control poses are equal.
   const double edge_s = kOrder * knot_s_;
   const auto [knot, u] = locate(std::clamp(t_s, -edge_s, duration_s() + edge_s), knot_s_);
   const Basis b = basis(u);
   const double per_s = 1 / knot_s_;
-  Motion m;
+  BodyMotion m;
   m.T_map_body.p = m.velocity = m.acceleration = Eigen::Vector3d::Zero();
   for (int i = 0; i < kOrder; ++i) {
     const Eigen::Vector3d& p = control_[index(knot - kBefore + i)].p;
@@ -80,18 +80,18 @@ Motion PoseSpline::at(double t_s) const {
     m.velocity += per_s * b.first[i] * p;
     m.acceleration += per_s * per_s * b.second[i] * p;
   }
-  Turning turning;
-  turning.q = control_[index(knot - kBefore)].q;
+  AngularMotion attitude;
+  attitude.q = control_[index(knot - kBefore)].q;
   for (int i = 1; i < kOrder; ++i) {
     const std::ptrdiff_t k = knot - kBefore + i;
     if (k <= 0 || k >= static_cast<std::ptrdiff_t>(control_.size())) continue;
     double value = 0, first = 0, second = 0;
     for (int j = i; j < kOrder; ++j) value += b.value[j], first += b.first[j], second += b.second[j];
-    turning.turn(steps_[static_cast<std::size_t>(k)], value, per_s * first, per_s * per_s * second);
+    attitude.rotate(steps_[static_cast<std::size_t>(k)], value, per_s * first, per_s * per_s * second);
   }
-  m.T_map_body.q = turning.q.normalized();
-  m.rate = turning.rate;
-  m.angular_acceleration = turning.angular_acceleration;
+  m.T_map_body.q = attitude.q.normalized();
+  m.rate = attitude.rate;
+  m.angular_acceleration = attitude.angular_acceleration;
   return m;
 }
 
@@ -100,7 +100,7 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Row i: what the control values count for at time i.
+/// Row i: weights of the control values at time i.
 Sparse design(const std::vector<double>& t_s, double knot_s, Eigen::Index count) {
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(t_s.size() * kOrder);
@@ -117,7 +117,7 @@ Sparse design(const std::vector<double>& t_s, double knot_s, Eigen::Index count)
   return matrix;
 }
 
-/// Third differences: what a smooth curve has little of.
+/// Third differences, which are small for a smooth curve.
 Sparse roughness(Eigen::Index count) {
   std::vector<Eigen::Triplet<double>> entries;
   const double weights[] = {-1, 3, -3, 1};
@@ -132,7 +132,7 @@ Sparse roughness(Eigen::Index count) {
 
 PoseSpline PoseSpline::fit(const std::vector<double>& t_s, const std::vector<Pose>& poses, double knot_s) {
   EVPOSE_CHECK(knot_s > 0 && !t_s.empty() && t_s.size() == poses.size() && t_s.front() >= 0);
-  // Weight of the roughness against one pose: bridges gaps and hardly bends what has poses.
+  // Weight of the roughness against one pose: bridges gaps and barely affects times that have poses.
   constexpr double kStiffness = 1e-7;
   constexpr int kRounds = 20;
   constexpr double kConverged_rad = 1e-12;
@@ -142,12 +142,12 @@ PoseSpline PoseSpline::fit(const std::vector<double>& t_s, const std::vector<Pos
   const Sparse transposed = a.transpose();
   Sparse tiny(count, count);
   tiny.setIdentity();
-  // The last term decides only where nothing else does: fewer poses than a curve needs.
+  // The last term makes the system regular where there are too few poses.
   const Sparse normal = transposed * a + kStiffness * Sparse(d.transpose() * d) + 1e-12 * tiny;
   const Eigen::SimplicialLDLT<Sparse> solver(normal);
   EVPOSE_CHECK(solver.info() == Eigen::Success);
 
-  // Starts from poses between neighbours, so that the solver sees only small corrections.
+  // Starts from poses interpolated between neighbours, so that the solver sees only small corrections.
   std::vector<Pose> control(static_cast<std::size_t>(count));
   std::size_t i = 0;
   for (std::size_t k = 0; k < control.size(); ++k) {

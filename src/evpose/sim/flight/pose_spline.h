@@ -9,14 +9,15 @@
 
 namespace evpose::sim {
 
-/// Attitude with its rate and angular acceleration, body frame.
-struct Turning {
+/// Attitude with angular rate and angular acceleration, both in the body frame.
+struct AngularMotion {
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();                  ///< rad/s
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< rad/s^2
 
-  /// Turns on by angle * axis, where the angle has these derivatives and the axis stands still in the body.
-  void turn(const Eigen::Vector3d& axis, double angle, double angle_1, double angle_2);
+  /// Appends a rotation by `angle` about `axis`, which is fixed in the body; `angle_1` and `angle_2` are the
+  /// first two time derivatives of the angle.
+  void rotate(const Eigen::Vector3d& axis, double angle, double angle_1, double angle_2);
 };
 
 /// Poses over time with four continuous derivatives: a uniform quintic B-spline of positions, and its
@@ -24,14 +25,14 @@ struct Turning {
 /// exact.
 class PoseSpline {
  public:
-  /// `control`[k] pulls at time k * knot_s; at least one. Before the first and after the last the ends are
+  /// `control`[k] belongs to time k * knot_s; at least one. Before the first and after the last the ends are
   /// held, so that the curve comes to rest there within three knots.
   PoseSpline(double knot_s, std::vector<Pose> control);
 
   /// Least squares through poses at increasing times from 0 on. Gaps are bridged smoothly.
   static PoseSpline fit(const std::vector<double>& t_s, const std::vector<Pose>& poses, double knot_s);
 
-  Motion at(double t_s) const;
+  BodyMotion at(double t_s) const;
   /// Time of the last control pose.
   double duration_s() const { return knot_s_ * static_cast<double>(control_.size() - 1); }
 

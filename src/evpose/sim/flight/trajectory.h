@@ -15,7 +15,7 @@ class ConfigTable;
 
 namespace evpose::sim {
 
-/// The way of the body: a spline of poses, and small fast waves on top. All derivatives are exact.
+/// BodyMotion of the body: a spline of poses with a vibration on top. All derivatives are exact.
 class Trajectory {
  public:
   /// amplitude * sin(2 pi frequency t + phase) for each axis.
@@ -26,12 +26,12 @@ class Trajectory {
     Eigen::Vector3d attitude_rad =
         Eigen::Vector3d::Zero();  ///< amplitude, about the body's x, then y, then z
   };
-  /// `duration_s`: at() is meant for 0 .. duration; beyond the end poses of the spline the body comes to
+  /// `duration_s`: at() is valid for 0 .. duration; beyond the last poses of the spline the body comes to
   /// rest.
   Trajectory(PoseSpline spline, std::vector<Wave> waves, double duration_s)
       : spline_(std::move(spline)), waves_(std::move(waves)), duration_s_(duration_s) {}
 
-  Motion at(double t_s) const;
+  BodyMotion at(double t_s) const;
   double duration_s() const { return duration_s_; }
 
  private:
@@ -56,17 +56,17 @@ enum class TrajectoryKind : std::uint8_t {
 /// Lengths along forward, left and up, where forward is the heading. Negative: the kind's own value.
 struct TrajectoryConfig {
   TrajectoryKind kind = TrajectoryKind::square_spiral;
-  double duration_s = -1;  ///< cut or go on so long; own: what the kind takes, or 10 s
-  double rest_s = 0;       ///< standing at the start, then a second to come to speed
+  double duration_s = -1;  ///< the flight is cut or extended to it; own: what the kind takes, or 10 s
+  double rest_s = 0;       ///< standing still at the start, then a second to reach speed
   int seed = 1;
   double centre_x_m = 3.25, centre_y_m = 3, centre_z_m = 1.5;  ///< of the volume; landing: of the pad's top
   double size_forward_m = 3.5, size_left_m = 3, size_up_m = 1.4;  ///< of the volume
   double heading_deg = 0;                                         ///< from +x to the left
-  double speed_m_s = -1;                                          ///< fastest
-  double rate_deg_s = -1;                                         ///< fastest, without vibration
-  double sway_deg = -1;   ///< amplitude of the slow turning to and fro
-  double turn_deg_s = 0;  ///< steady turning to the left
-  double bank = 0.5;      ///< share of the tilt that a multicopter's acceleration asks for
+  double speed_m_s = -1;                                          ///< peak
+  double rate_deg_s = -1;                                         ///< peak, without vibration
+  double sway_deg = -1;   ///< amplitude of the slow rotation back and forth
+  double turn_deg_s = 0;  ///< steady yaw rate to the left
+  double bank = 0.5;      ///< fraction of the tilt that a multicopter needs for its acceleration
   double start_height_m = 6, start_forward_m = 0, start_left_m = 0;  ///< landing: start above the pad's top
   double end_height_m = 0.25;                                        ///< landing: end above it
   double wind_m = 0.08;  ///< landing: 1 sigma of the sideways disturbance

@@ -14,8 +14,8 @@ constexpr double kPi = std::numbers::pi;
 
 }  // namespace
 
-double fastest(const Curve& position, double duration_s) {
-  constexpr double kStep_s = 0.02;  // finer than anything moves
+double peak_speed(const Curve& position, double duration_s) {
+  constexpr double kStep_s = 0.02;  // finer than any motion in the curves
   const int steps = std::max(4000, static_cast<int>(duration_s / kStep_s));
   const double step = duration_s / steps;
   double most = 0;
@@ -28,11 +28,11 @@ double fastest(const Curve& position, double duration_s) {
   return most;
 }
 
-Curve at_top_speed(Curve curve, double speed_m_s, double duration_s) {
+Curve with_peak_speed(Curve curve, double speed_m_s, double duration_s) {
   double low = 0, high = 1e3;
   for (int i = 0; i < 60; ++i) {
     const double pace = 0.5 * (low + high);
-    const bool too_fast = fastest([&](double t) { return curve(pace * t); }, duration_s) > speed_m_s;
+    const bool too_fast = peak_speed([&](double t) { return curve(pace * t); }, duration_s) > speed_m_s;
     (too_fast ? high : low) = pace;
   }
   return [curve = std::move(curve), pace = low](double t) { return curve(pace * t); };
@@ -86,8 +86,9 @@ Curve lissajous(const Vector3d& half, const Vector3d& ratio, Random& random) {
 Curve square_spiral(const Vector3d& half, Random& random) {
   constexpr double kTurns = 4;  // out
   constexpr double kSmallest = 0.25;
-  constexpr double kSquare = 0.1;  // share of the third harmonic that makes a circle a rounded square
-  constexpr double kDepth = 0.3;   // of the volume, to and fro along the heading
+  constexpr double kSquare =
+      0.1;                        // amplitude of the third harmonic that turns a circle into a rounded square
+  constexpr double kDepth = 0.3;  // of the volume, back and forth along the heading
   const double side = std::min(half.y(), half.z()) / (1 - kSquare);
   const double start = random.uniform(0, 2 * kPi), depth_phase = random.uniform(0, 2 * kPi);
   return [=](double a) -> Vector3d {
@@ -100,7 +101,7 @@ Curve square_spiral(const Vector3d& half, Random& random) {
   };
 }
 
-double ease(double u) {
+double minimum_jerk(double u) {
   u = std::clamp(u, 0.0, 1.0);
   return u * u * u * (10 + u * (6 * u - 15));
 }

@@ -23,16 +23,16 @@ constexpr double kKnot_s = 0.02;
 constexpr double kLongest_s = 14400;
 constexpr double kStart_s = 1;  // from rest to speed
 
-/// The kind's own values, and those that were given instead.
-struct Values {
+/// The defaults of the kind, overridden by what the config sets.
+struct MotionLimits {
   double speed_m_s, rate_rad_s, sway_rad, vibration_m, vibration_rad;
 };
 
-Values values_of(const TrajectoryConfig& c) {
-  struct Own {
+MotionLimits motion_limits(const TrajectoryConfig& c) {
+  struct Defaults {
     double speed_m_s, rate_deg_s, sway_deg, vibration_mm, vibration_deg;
   };
-  const Own own = [&]() -> Own {
+  const Defaults defaults = [&]() -> Defaults {
     switch (c.kind) {
       case Kind::square_spiral:
         return {0.8, 18, 7, 0, 0};
@@ -58,16 +58,16 @@ Values values_of(const TrajectoryConfig& c) {
     return {};
   }();
   const auto pick = [](double given, double otherwise) { return given >= 0 ? given : otherwise; };
-  return {pick(c.speed_m_s, own.speed_m_s), kDegree * pick(c.rate_deg_s, own.rate_deg_s),
-          kDegree * pick(c.sway_deg, own.sway_deg), 1e-3 * pick(c.vibration_mm, own.vibration_mm),
-          kDegree * pick(c.vibration_deg, own.vibration_deg)};
+  return {pick(c.speed_m_s, defaults.speed_m_s), kDegree * pick(c.rate_deg_s, defaults.rate_deg_s),
+          kDegree * pick(c.sway_deg, defaults.sway_deg), 1e-3 * pick(c.vibration_mm, defaults.vibration_mm),
+          kDegree * pick(c.vibration_deg, defaults.vibration_deg)};
 }
 
-/// What a kind plans, over its flight time: that is the time without the rest at the start.
+/// The flight of a kind over flight time, which does not count the rest at the start.
 struct Plan {
-  std::function<Vector3d(double t_s)> position;  ///< map frame
-  std::function<double(double t_s)> yaw;         ///< rad
-  std::function<double(double t_s)> calm;        ///< factor of sway and bank
+  std::function<Vector3d(double t_s)> position;   ///< map frame
+  std::function<double(double t_s)> yaw;          ///< rad
+  std::function<double(double t_s)> sway_factor;  ///< scales slow rotation and bank
   double duration_s = 10;
 };
 
@@ -80,20 +80,20 @@ std::function<Vector3d(const Vector3d&)> volume_to_map(const TrajectoryConfig& c
   return [centre, q](const Vector3d& p) -> Vector3d { return centre + q * p; };
 }
 
-Error too_long(double duration_s) {
-  return {"trajectory.speed_m_s", text("the way takes ", duration_s, " s"),
+Error duration_error(double duration_s) {
+  return {"trajectory.speed_m_s", text("the flight takes ", duration_s, " s"),
           text("fly faster, or give a duration up to ", kLongest_s, " s")};
 }
 
-Plan plan_landing(const TrajectoryConfig& c, const Values& v, Random& random) {
+Plan plan_landing(const TrajectoryConfig& c, const MotionLimits& v, Random& random) {
   const auto to_map = volume_to_map(c);
   const Vector3d start(c.start_forward_m, c.start_left_m, c.start_height_m), end(0, 0, c.end_height_m);
-  constexpr double kAbove = 0.7;   // of the way is flown when the body is above the pad
-  constexpr double kPeak = 1.875;  // of the mean speed of ease()
+  constexpr double kAbove = 0.7;   // of the descent is flown when the body is above the pad
+  constexpr double kPeak = 1.875;  // of the mean speed of minimum_jerk()
   const auto gusts = random_waves(random, 0.15, 1.2);
   const auto path = [=](double descent_s) {
     return [=](double t) -> Vector3d {
-      const double u = t / descent_s, down = ease(u), across = ease(u / kAbove);
+      const double u = t / descent_s, down = minimum_jerk(u), across = minimum_jerk(u / kAbove);
       const double calm = 1 - down;
       const Vector3d sway = c.wind_m * calm * Vector3d(1, 1, 0.3).cwiseProduct(gusts(t));
       return {std::lerp(start.x(), end.x(), across) + sway.x(),
@@ -103,31 +103,31 @@ Plan plan_landing(const TrajectoryConfig& c, const Values& v, Random& random) {
   };
   double descent_s = kPeak * (end - start).norm() / v.speed_m_s;
   for (int i = 0; i < 20; ++i) {  // the gusts add to the speed
-    const double excess = fastest(path(descent_s), descent_s) / v.speed_m_s;
+    const double excess = peak_speed(path(descent_s), descent_s) / v.speed_m_s;
     if (excess <= 1) break;
     descent_s *= std::min(2.0, std::max(excess, 1.001));
   }
   constexpr double kStand_s = 1;
   Plan plan;
   plan.position = [to_map, p = path(descent_s)](double t) { return to_map(p(t)); };
-  plan.calm = [descent_s](double t) { return 1 - ease(t / descent_s); };
+  plan.sway_factor = [descent_s](double t) { return 1 - minimum_jerk(t / descent_s); };
   plan.duration_s = descent_s + kStand_s;
   return plan;
 }
 
-Plan plan_hover(const TrajectoryConfig& c, const Values& v, Random& random) {
+Plan plan_hover(const TrajectoryConfig& c, const MotionLimits& v, Random& random) {
   const auto drift = random_waves(random, 0.06, 0.4);
   const Vector3d half = 0.5 * Vector3d(c.size_forward_m, c.size_left_m, c.size_up_m);
   Plan plan;
   plan.duration_s = c.duration_s > 0 ? c.duration_s : 30;
-  const double unit_speed = fastest(drift, plan.duration_s);
+  const double unit_speed = peak_speed(drift, plan.duration_s);
   // Stays in the volume: the waves sum up to at most sqrt(10).
   const double scale = std::min(v.speed_m_s / unit_speed, half.minCoeff() / std::sqrt(10.0));
   plan.position = [to_map = volume_to_map(c), drift, scale](double t) { return to_map(scale * drift(t)); };
   return plan;
 }
 
-Expected<Plan> plan_traverse(const TrajectoryConfig& c, const Values& v) {
+Expected<Plan> plan_traverse(const TrajectoryConfig& c, const MotionLimits& v) {
   const Vector3d half = 0.5 * Vector3d(c.size_forward_m, c.size_left_m, c.size_up_m);
   constexpr double kWave_m = 25, kUpWave_m = 37;  // lengths of the weaving
   const auto curve = [=](double a) -> Vector3d {
@@ -140,13 +140,13 @@ Expected<Plan> plan_traverse(const TrajectoryConfig& c, const Values& v) {
     length += (curve(2 * half.x() * (i + 1) / kSteps) - curve(2 * half.x() * i / kSteps)).norm();
   Plan plan;
   plan.duration_s = length / v.speed_m_s + kStart_s;
-  if (plan.duration_s > kLongest_s) return too_long(plan.duration_s);
+  if (plan.duration_s > kLongest_s) return duration_error(plan.duration_s);
   const auto flown = at_constant_speed(curve, v.speed_m_s, plan.duration_s, 2 * half.x());
   plan.position = [to_map = volume_to_map(c), flown](double t) { return to_map(flown(t)); };
   return plan;
 }
 
-Expected<Plan> plan_waypoints(const TrajectoryConfig& c, const Values& v) {
+Expected<Plan> plan_waypoints(const TrajectoryConfig& c, const MotionLimits& v) {
   auto points = read_waypoints(c.file);
   if (!points) return points.error();
   struct Stop {
@@ -189,7 +189,7 @@ Expected<Plan> plan_waypoints(const TrajectoryConfig& c, const Values& v) {
   return plan;
 }
 
-Expected<Plan> make_plan(const TrajectoryConfig& c, const Values& v) {
+Expected<Plan> make_plan(const TrajectoryConfig& c, const MotionLimits& v) {
   Random random(static_cast<std::uint64_t>(c.seed), 1);
   const Vector3d half = 0.5 * Vector3d(c.size_forward_m, c.size_left_m, c.size_up_m);
   Plan plan;
@@ -215,10 +215,10 @@ Expected<Plan> make_plan(const TrajectoryConfig& c, const Values& v) {
       return in_volume(at_constant_speed(square_spiral(half, random), v.speed_m_s, flight_s, 1e9));
     case Kind::sweep:
       return in_volume(
-          at_top_speed(lissajous(half.cwiseProduct(Vector3d(0.15, 1, 0.15)), {0.37, 1, 0.61}, random),
-                       v.speed_m_s, flight_s));
+          with_peak_speed(lissajous(half.cwiseProduct(Vector3d(0.15, 1, 0.15)), {0.37, 1, 0.61}, random),
+                          v.speed_m_s, flight_s));
     default:
-      return in_volume(at_top_speed(lissajous(half, {0.71, 1, 1.37}, random), v.speed_m_s, flight_s));
+      return in_volume(with_peak_speed(lissajous(half, {0.71, 1, 1.37}, random), v.speed_m_s, flight_s));
   }
 }
 
@@ -227,8 +227,8 @@ bool has_corners(Kind kind) { return kind == Kind::waypoints || kind == Kind::tr
 // Half widths of the rounding of corners and tilt, knots.
 constexpr std::ptrdiff_t kCorner = 20, kTilt = 5;
 
-/// Time of the start of the flight. Whatever is rounded begins earlier than planned, which must not shorten
-/// the rest.
+/// Time of the start of the flight. Smoothing moves the first motion forward, which must not shorten the
+/// rest.
 double start_of_flight(const TrajectoryConfig& c) {
   if (c.rest_s <= 0) return 0;
   const auto early = static_cast<double>(2 * kTilt + 4 + (has_corners(c.kind) ? 2 * kCorner : 0));
@@ -242,8 +242,8 @@ double flight_time(double t_s, double rest_s) {
   return kStart_s * (u < 1 ? u * u * u * (1 - 0.5 * u) : u - 0.5);
 }
 
-/// Slow turning to and fro about z, y and x, whose fastest moment has about the rate.
-std::function<Vector3d(double)> sway_of(const Values& v, Random& random) {
+/// Slow rotation back and forth about z, y and x with about the given peak rate.
+std::function<Vector3d(double)> slow_rotation(const MotionLimits& v, Random& random) {
   const Vector3d amplitude = v.sway_rad * Vector3d(0.55, 0.6, 1);
   const double omega = v.sway_rad > 0 ? v.rate_rad_s / (1.6 * v.sway_rad) : 0;
   Eigen::Matrix<double, 3, 2> phase;
@@ -258,20 +258,21 @@ std::function<Vector3d(double)> sway_of(const Values& v, Random& random) {
   };
 }
 
-/// Tilt that makes a multicopter accelerate so, in its own axes.
+/// Tilt, as a rotation vector in body axes, that gives a multicopter this acceleration.
 Vector3d tilt(const Vector3d& acceleration, double yaw) {
   const Vector3d a = about_z(-yaw) * acceleration;
   const double g = -gravity_map().z();
   return {-std::atan2(a.y(), g), std::atan2(a.x(), g), 0};
 }
 
-PoseSpline spline_of(const Plan& plan, const TrajectoryConfig& c, const Values& v, double duration_s) {
+PoseSpline plan_spline(const Plan& plan, const TrajectoryConfig& c, const MotionLimits& v,
+                       double duration_s) {
   Random random(static_cast<std::uint64_t>(c.seed), 2);
   const auto count = static_cast<std::size_t>(std::ceil(duration_s / kKnot_s)) + 8;
   const double rest_s = start_of_flight(c);
   std::vector<Vector3d> position(count), turn(count);
   std::vector<double> yaw(count);
-  const auto sway = sway_of(v, random);
+  const auto sway = slow_rotation(v, random);
   const double heading = kDegree * c.heading_deg;
   for (std::size_t k = 0; k < count; ++k) {
     const double t = flight_time(kKnot_s * static_cast<double>(k), rest_s);
@@ -290,31 +291,31 @@ PoseSpline spline_of(const Plan& plan, const TrajectoryConfig& c, const Values& 
   bank = smooth(std::move(bank), kTilt);
   for (std::size_t k = 0; k < count; ++k) {
     turn[k] += bank[k];
-    if (plan.calm) turn[k] *= plan.calm(flight_time(kKnot_s * static_cast<double>(k), rest_s));
+    if (plan.sway_factor) turn[k] *= plan.sway_factor(flight_time(kKnot_s * static_cast<double>(k), rest_s));
   }
-  const auto spline = [&](double share) {
+  const auto spline = [&](double fraction) {
     std::vector<Pose> control(count);
     for (std::size_t k = 0; k < count; ++k)
-      control[k] = {about_z(yaw[k]) * so3::exp(share * turn[k]), position[k]};
+      control[k] = {about_z(yaw[k]) * so3::exp(fraction * turn[k]), position[k]};
     return PoseSpline(kKnot_s, std::move(control));
   };
-  // As much of sway and bank as the rate allows; a little more than planned where it asks for more.
-  const auto fastest_turn = [&](double share) {
-    const PoseSpline s = spline(share);
+  // Scales slow rotation and bank to the largest size whose peak rate stays below the limit.
+  const auto peak_rate = [&](double fraction) {
+    const PoseSpline s = spline(fraction);
     double most = 0;
     for (double t = 0; t <= duration_s; t += kKnot_s) most = std::max(most, s.at(t).rate.norm());
     return most;
   };
   double low = 0, high = v.sway_rad > 0 ? 2 : 1;
-  if (fastest_turn(high) <= v.rate_rad_s) return spline(high);
+  if (peak_rate(high) <= v.rate_rad_s) return spline(high);
   for (int i = 0; i < 12; ++i) {
-    const double share = 0.5 * (low + high);
-    (fastest_turn(share) > v.rate_rad_s ? high : low) = share;
+    const double fraction = 0.5 * (low + high);
+    (peak_rate(fraction) > v.rate_rad_s ? high : low) = fraction;
   }
   return spline(low);
 }
 
-std::vector<Trajectory::Wave> vibration(const TrajectoryConfig& c, const Values& v) {
+std::vector<Trajectory::Wave> vibration(const TrajectoryConfig& c, const MotionLimits& v) {
   if (v.vibration_m <= 0 && v.vibration_rad <= 0) return {};
   Random random(static_cast<std::uint64_t>(c.seed), 3);
   Trajectory::Wave wave;
@@ -329,7 +330,7 @@ struct FlownSpline {
   PoseSpline spline;
   double duration_s;
 };
-Expected<FlownSpline> spline_of_file(const TrajectoryConfig& c) {
+Expected<FlownSpline> fit_file(const TrajectoryConfig& c) {
   auto rows = read_trajectory(c.file);
   if (!rows) return rows.error();
   if (rows->size() < 2) return Error{c.file, "one pose is no trajectory", "give two or more"};
@@ -357,11 +358,11 @@ Expected<FlownSpline> spline_of_file(const TrajectoryConfig& c) {
 }  // namespace
 
 Expected<Trajectory> make_trajectory(const TrajectoryConfig& c) {
-  const Values values = values_of(c);
+  const MotionLimits values = motion_limits(c);
   if ((c.kind == Kind::file || c.kind == Kind::waypoints) && c.file.empty())
     return Error{"trajectory.file", "no file named", "name the file of the trajectory"};
   if (c.kind == Kind::file) {
-    auto flown = spline_of_file(c);
+    auto flown = fit_file(c);
     if (!flown) return flown.error();
     const double duration_s = c.duration_s > 0 ? c.duration_s : flown->duration_s;
     return Trajectory(std::move(flown->spline), vibration(c, values), duration_s);
@@ -371,8 +372,8 @@ Expected<Trajectory> make_trajectory(const TrajectoryConfig& c) {
   const double duration_s = c.duration_s > 0
                                 ? c.duration_s
                                 : plan->duration_s + (c.rest_s > 0 ? start_of_flight(c) + 0.5 * kStart_s : 0);
-  if (duration_s > kLongest_s) return too_long(duration_s);
-  return Trajectory(spline_of(*plan, c, values, duration_s), vibration(c, values), duration_s);
+  if (duration_s > kLongest_s) return duration_error(duration_s);
+  return Trajectory(plan_spline(*plan, c, values, duration_s), vibration(c, values), duration_s);
 }
 
 }  // namespace evpose::sim

@@ -54,7 +54,7 @@ Trajectory wild() {
 void expect_derivatives_equal_differences(const Trajectory& trajectory, double end_s) {
   const double h = 1e-5;
   for (double t = 2 * h; t < end_s; t += 0.0371) {
-    const Motion now = trajectory.at(t), before = trajectory.at(t - h), after = trajectory.at(t + h);
+    const BodyMotion now = trajectory.at(t), before = trajectory.at(t - h), after = trajectory.at(t + h);
     const auto check = [&](const Eigen::Vector3d& difference, const Eigen::Vector3d& value,
                            const char* what) {
       EXPECT_LT((difference / (2 * h) - value).norm(), 1e-5 * (1 + value.norm())) << what << " at " << t;
@@ -75,7 +75,7 @@ TEST(Trajectory, AccelerationsAreContinuousAtKnots) {
   const Trajectory trajectory = wild();
   const double h = 1e-9;
   for (int k = -2; k < 63; ++k) {
-    const Motion before = trajectory.at(0.1 * k - h), after = trajectory.at(0.1 * k + h);
+    const BodyMotion before = trajectory.at(0.1 * k - h), after = trajectory.at(0.1 * k + h);
     // A jump would be of the size of the accelerations, some 10 to 100.
     EXPECT_LT((after.acceleration - before.acceleration).norm(), 1e-4) << k;
     EXPECT_LT((after.angular_acceleration - before.angular_acceleration).norm(), 1e-4) << k;
@@ -86,7 +86,7 @@ TEST(Trajectory, AccelerationsAreContinuousAtKnots) {
 TEST(Trajectory, SplineRestsBeyondItsEnds) {
   const PoseSpline spline(0.1, {{so3::exp({1, 0, 0}), {1, 2, 3}}, {so3::exp({0, 1, 0}), {2, 2, 2}}});
   for (const double t : {-0.5, -100.0, 0.6, 100.0}) {
-    const Motion m = spline.at(t);
+    const BodyMotion m = spline.at(t);
     EXPECT_LT(m.T_map_body
                   .minus(t < 0 ? Pose{so3::exp({1, 0, 0}), {1, 2, 3}} : Pose{so3::exp({0, 1, 0}), {2, 2, 2}})
                   .norm(),
@@ -125,7 +125,7 @@ struct Extremes {
 Extremes extremes_of(const Trajectory& trajectory) {
   Extremes e;
   for (double t = 0; t <= trajectory.duration_s(); t += 0.005) {
-    const Motion m = trajectory.at(t);
+    const BodyMotion m = trajectory.at(t);
     e.speed = std::max(e.speed, m.velocity.norm());
     e.rate = std::max(e.rate, m.rate.norm());
     e.low = e.low.cwiseMin(m.T_map_body.p);
@@ -182,7 +182,7 @@ TEST(Trajectory, LandingGoesFromItsStartToStandOverThePad) {
   EXPECT_LT((trajectory.at(0).T_map_body.p - Eigen::Vector3d(-1.5, 0.8, 6.3)).norm(), 0.3);
   EXPECT_GT(trajectory.duration_s(), 4);
   EXPECT_LT(trajectory.duration_s(), 10);
-  const Motion end = trajectory.at(trajectory.duration_s());
+  const BodyMotion end = trajectory.at(trajectory.duration_s());
   EXPECT_LT((end.T_map_body.p - Eigen::Vector3d(0, 0, 0.55)).norm(), 1e-6);
   EXPECT_LT(end.velocity.norm() + end.rate.norm() + end.acceleration.norm(), 1e-6);
   EXPECT_LT(so3::log(end.T_map_body.q).norm(), 1e-6);  // level
@@ -200,7 +200,7 @@ TEST(Trajectory, RestsAtTheStartAsLongAsTold) {
     c.rest_s = 1.5;
     const Trajectory trajectory = make(c);
     for (double t = 0; t <= 1.5; t += 0.05) {
-      const Motion m = trajectory.at(t);
+      const BodyMotion m = trajectory.at(t);
       EXPECT_LT(m.velocity.norm() + m.rate.norm(), 1e-9) << t;
     }
     EXPECT_GT(extremes_of(trajectory).speed, 0.5);
@@ -226,7 +226,7 @@ TEST(Trajectory, IntegratedRatesAndForcesReturnToTheTrajectoryAfterTenSeconds) {
     const Trajectory trajectory = make(c);
     const auto rate = [&](int i) { return trajectory.at(1e-3 * i).rate; };
     const auto force = [&](int i) -> Eigen::Vector3d {
-      const Motion m = trajectory.at(1e-3 * i);
+      const BodyMotion m = trajectory.at(1e-3 * i);
       return m.T_map_body.q.conjugate() * (m.acceleration - gravity_map());
     };
     struct State {
@@ -241,7 +241,7 @@ TEST(Trajectory, IntegratedRatesAndForcesReturnToTheTrajectoryAfterTenSeconds) {
     const auto add = [](const State& s, double h, const State& d) -> State {
       return {s.q + h * d.q, s.v + h * d.v, s.p + h * d.p};
     };
-    const Motion start = trajectory.at(0);
+    const BodyMotion start = trajectory.at(0);
     State s{start.T_map_body.q.coeffs(), start.velocity, start.T_map_body.p};
     const double h = 2e-3;
     for (int i = 0; i < 10000; i += 2) {
@@ -252,7 +252,7 @@ TEST(Trajectory, IntegratedRatesAndForcesReturnToTheTrajectoryAfterTenSeconds) {
       s = add(add(add(add(s, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
       s.q.normalize();
     }
-    const Motion end = trajectory.at(10);
+    const BodyMotion end = trajectory.at(10);
     EXPECT_LT((s.p - end.T_map_body.p).norm(), 1e-4) << static_cast<int>(kind);
     EXPECT_LT((s.v - end.velocity).norm(), 1e-4) << static_cast<int>(kind);
     EXPECT_LT(so3::log(Eigen::Quaterniond(s.q).conjugate() * end.T_map_body.q).norm(), 1e-5);
@@ -273,7 +273,7 @@ TEST(Trajectory, FileIsFlownAsWritten) {
   const Trajectory again = make(c);
   EXPECT_NEAR(again.duration_s(), 10, 1e-9);
   for (double t = 0.3; t < 9.7; t += 0.037) {
-    const Motion a = original.at(t), b = again.at(t);
+    const BodyMotion a = original.at(t), b = again.at(t);
     EXPECT_LT(b.T_map_body.minus(a.T_map_body).norm(), 5e-4) << t;
     EXPECT_LT((a.velocity - b.velocity).norm(), 0.02) << t;
     EXPECT_LT((a.rate - b.rate).norm(), 0.02) << t;
@@ -308,7 +308,7 @@ TEST(Trajectory, WaypointsArePassedAndPausedAt) {
   const Trajectory trajectory = make(c);
   double nearest = 1e9, still_s = 0;
   for (double t = 0; t <= trajectory.duration_s(); t += 0.01) {
-    const Motion m = trajectory.at(t);
+    const BodyMotion m = trajectory.at(t);
     nearest = std::min(nearest, (m.T_map_body.p - Eigen::Vector3d(4, 0, 1)).norm());
     still_s += m.velocity.norm() < 1e-3 && t > 2 && t < 9 ? 0.01 : 0;
     EXPECT_LT(m.velocity.norm(), 1.01);

@@ -6,16 +6,16 @@
 #include <numbers>
 
 #include "evpose/core/parallel.h"
-#include "evpose/sim/light/stage.h"
+#include "evpose/sim/light/prepared_scene.h"
+#include "evpose/sim/light/scene_view.h"
 #include "evpose/sim/light/test_scene.h"
-#include "evpose/sim/light/view.h"
 #include "evpose/sim/world/random.h"
 #include "evpose/sim/world/texture.h"
 
 namespace evpose::sim {
 namespace {
 
-TEST(PixelRays, ShareAboveIsTheAreaOfTheCutSquare) {
+TEST(PixelRays, FractionAboveIsTheAreaOfTheCutSquare) {
   Random random(1);
   for (int trial = 0; trial < 50; ++trial) {
     const auto level = static_cast<float>(random.uniform(-1, 1));
@@ -28,11 +28,11 @@ TEST(PixelRays, ShareAboveIsTheAreaOfTheCutSquare) {
       const float y = (static_cast<float>(i / kSide) + 0.5F) / kSide - 0.5F;
       if (level + slope.x() * x + slope.y() * y > 0) ++above;
     }
-    EXPECT_NEAR(share_above(level, slope), above / static_cast<double>(kSide * kSide), 4e-3);
+    EXPECT_NEAR(fraction_above(level, slope), above / static_cast<double>(kSide * kSide), 4e-3);
   }
-  EXPECT_EQ(share_above(0.2F, {0, 0}), 1);
-  EXPECT_EQ(share_above(-0.2F, {0, 0}), 0);
-  EXPECT_FLOAT_EQ(share_above(0.25F, {1, 0}), 0.75F);
+  EXPECT_EQ(fraction_above(0.2F, {0, 0}), 1);
+  EXPECT_EQ(fraction_above(-0.2F, {0, 0}), 0);
+  EXPECT_FLOAT_EQ(fraction_above(0.25F, {1, 0}), 0.75F);
 }
 
 // A wave along u with a period of 16 texels, on a rectangle whose texels do not halve evenly.
@@ -61,7 +61,7 @@ TEST(Surfaces, RectanglesAreOnePatchAndBoxesSix) {
   const int grey = plain.material(0.5);
   TestScene::add_box(plain.scene.mesh, {0, 0, 0}, {1, 2, 3}, grey);
   std::int32_t first = 0;
-  const PartSurfaces surfaces = order_surfaces(plain.scene.mesh, first);
+  const PartSurfaces surfaces = segment_surfaces(plain.scene.mesh, first);
   ASSERT_EQ(surfaces.patches.size(), 6U);
   EXPECT_EQ(first, 12);
   for (std::size_t i = 0; i < 12; ++i) {
@@ -91,12 +91,13 @@ TEST(Lighting, LampFollowsTheSquareOfDistanceAndThrowsShadows) {
   lamp.position = {0, 0, 0};
   lamp.radius = 0.02;
   ThreadPool pool(1);
-  const Stage stage(plain.scene, pool);
-  const View view = make_view(stage, 0, looking_along_x({1.5, 0, 0}));
+  const PreparedScene prepared(plain.scene, pool);
+  const SceneView view = make_scene_view(prepared, 0, looking_along_x({1.5, 0, 0}));
   const auto at = [&](double y, double z) {
     const PixelRay ray{
         Eigen::Vector2f(static_cast<float>(-y / 0.5), static_cast<float>(-z / 0.5)), {1e-3F, 0}, {0, 1e-3F}};
-    return static_cast<double>(luminance(stage, view, view_patch(view, stage.still.patches[0], -1), ray)) *
+    return static_cast<double>(
+               luminance(prepared, view, make_patch_view(view, prepared.still.patches[0], -1), ray)) *
            std::numbers::pi;
   };
   for (const double y : {-0.5, -0.1, 0.1}) {
@@ -126,20 +127,21 @@ TEST(Lighting, SwitchingIsAFactorOfTime) {
 }
 
 // A pixel's mean through the whole path: distance and slant change the footprint, never the mean brightness.
-TEST(View, PlainWallHasOneLuminanceFromEverywhere) {
+TEST(SceneView, PlainWallHasOneLuminanceFromEverywhere) {
   TestScene plain;
   plain.add({2, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.4);
   ThreadPool pool(1);
-  const Stage stage(plain.scene, pool);
+  const PreparedScene prepared(plain.scene, pool);
   const auto camera = test_camera(32, 24, 60);
   const auto rays = pixel_rays(*camera);
   ASSERT_TRUE(rays.ok());
   for (const double yaw : {-0.5, 0.0, 0.7}) {
     Pose pose = looking_along_x({1, 0.1, 0.2});
     pose.q = so3::exp({0, 0, yaw}) * pose.q;
-    const View view = make_view(stage, 0, pose);
+    const SceneView view = make_scene_view(prepared, 0, pose);
     for (const PixelRay& ray : *rays)
-      EXPECT_NEAR(luminance(stage, view, view_patch(view, stage.still.patches[0], -1), ray), 0.4, 1e-5);
+      EXPECT_NEAR(luminance(prepared, view, make_patch_view(view, prepared.still.patches[0], -1), ray), 0.4,
+                  1e-5);
   }
 }
 

@@ -13,59 +13,61 @@
 namespace evpose::sim {
 namespace {
 
-constexpr int kShadowRays = 12;  // steps of a half shadow: none is seen as an edge
-constexpr int kOpenRays = 24;
-constexpr double kOpenReach_m = 1.5;  // what is farther keeps no light away
-constexpr double kTexels = 5e5;       // of a world, about
+constexpr int kShadowRays = 12;  // brightness steps of a penumbra, too fine to look like edges
+constexpr int kAmbientRays = 24;
+constexpr double kOcclusionReach_m = 1.5;  // occluders farther away do not darken ambient light
+constexpr double kTexels = 5e5;            // of a world, about
 constexpr double kFinest_m = 0.02, kCoarsest_m = 0.3;
-constexpr int kMostTexels = 2048;  // along a side
-constexpr float kOff_m = 2e-3F;    // shadow rays start so far off their surface, ...
-constexpr double kInset_m = 4e-3;  // ... and so far from its rim
+constexpr int kMostTexels = 2048;      // along a side
+constexpr float kRayOffset_m = 2e-3F;  // distance from the surface at which shadow rays start
+constexpr double kInset_m = 4e-3;      // distance from the rim of the surface at which they start
 
-// Evenly spread over the unit disc (sunflower).
-std::array<Eigen::Vector2d, kOpenRays> spread(int n) {
-  std::array<Eigen::Vector2d, kOpenRays> points;
-  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+// Evenly spread points of the unit disc (sunflower seeds).
+std::array<Eigen::Vector2d, kAmbientRays> sunflower_disc(int n) {
+  std::array<Eigen::Vector2d, kAmbientRays> points;
+  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
   for (int i = 0; i < n; ++i)
-    points[i] = std::sqrt((i + 0.5) / n) * Eigen::Vector2d(std::cos(i * golden), std::sin(i * golden));
+    points[i] =
+        std::sqrt((i + 0.5) / n) * Eigen::Vector2d(std::cos(i * golden_angle), std::sin(i * golden_angle));
   return points;
 }
 
-struct Basis {
+struct TangentBasis {
   Eigen::Vector3d a, b;
 };
-Basis across(const Eigen::Vector3d& n) {
+TangentBasis tangent_basis(const Eigen::Vector3d& n) {
   const Eigen::Vector3d other = std::abs(n.z()) < 0.9 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitX();
   const Eigen::Vector3d a = n.cross(other).normalized();
   return {a, n.cross(a)};
 }
 
-class Baker {
+class LightBaker {
  public:
-  Baker(const RayCaster& rays, const LightChannels& channels) : rays_(rays), channels_(channels) {}
+  LightBaker(const RayCaster& rays, const LightChannels& channels) : rays_(rays), channels_(channels) {}
 
-  void light_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, float* by_channel) const {
+  void illuminance_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, float* by_channel) const {
     const Scene& scene = rays_.scene();
     std::fill_n(by_channel, channels_.switching.size(), 0.0F);
-    double open = -1;
+    double ambient = -1;
     for (std::size_t i = 0; i < scene.lights.size(); ++i) {
       const Light& light = scene.lights[i];
       double lux = 0;
       switch (light.kind) {
         case LightKind::sun: {
           const double facing = -normal.dot(light.direction);
-          if (facing > 0) lux = light.strength * facing * seen_sun(point, light);
+          if (facing > 0) lux = light.strength * facing * sun_visibility(point, light);
           break;
         }
         case LightKind::lamp: {
-          const Eigen::Vector3d way = light.position - point;
-          const double facing = normal.dot(way) / way.norm();
-          if (facing > 0) lux = light.strength * facing / way.squaredNorm() * seen_lamp(point, light);
+          const Eigen::Vector3d direction = light.position - point;
+          const double facing = normal.dot(direction) / direction.norm();
+          if (facing > 0)
+            lux = light.strength * facing / direction.squaredNorm() * lamp_visibility(point, light);
           break;
         }
         case LightKind::ambient:
-          if (open < 0) open = openness(point, normal);
-          lux = light.strength * open;
+          if (ambient < 0) ambient = ambient_visibility(point, normal);
+          lux = light.strength * ambient;
           break;
       }
       by_channel[channels_.of_light[i]] += static_cast<float>(lux);
@@ -73,45 +75,46 @@ class Baker {
   }
 
  private:
-  double seen_sun(const Eigen::Vector3d& point, const Light& light) const {
-    const Basis basis = across(light.direction);
+  double sun_visibility(const Eigen::Vector3d& point, const Light& light) const {
+    const TangentBasis basis = tangent_basis(light.direction);
     int seen = 0;
     for (int i = 0; i < kShadowRays; ++i) {
       const Eigen::Vector2d at = light.radius * disc_[i];
-      const Eigen::Vector3d way = -light.direction + at.x() * basis.a + at.y() * basis.b;
-      if (!rays_.blocked(point, way, kOff_m, std::numeric_limits<float>::infinity())) ++seen;
+      const Eigen::Vector3d direction = -light.direction + at.x() * basis.a + at.y() * basis.b;
+      if (!rays_.occluded(point, direction, kRayOffset_m, std::numeric_limits<float>::infinity())) ++seen;
     }
     return static_cast<double>(seen) / kShadowRays;
   }
 
-  double seen_lamp(const Eigen::Vector3d& point, const Light& light) const {
-    const Basis basis = across((light.position - point).normalized());
+  double lamp_visibility(const Eigen::Vector3d& point, const Light& light) const {
+    const TangentBasis basis = tangent_basis((light.position - point).normalized());
     int seen = 0;
     for (int i = 0; i < kShadowRays; ++i) {
       const Eigen::Vector2d at = light.radius * disc_[i];
-      const Eigen::Vector3d way = light.position + at.x() * basis.a + at.y() * basis.b - point;
-      const auto length = static_cast<float>(way.norm());
-      // The lamp's own housing does not shade it.
+      const Eigen::Vector3d direction = light.position + at.x() * basis.a + at.y() * basis.b - point;
+      const auto length = static_cast<float>(direction.norm());
+      // The housing of the lamp casts no shadow.
       const float end = 1 - std::min(0.5F, (static_cast<float>(light.radius) + 0.02F) / length);
-      if (!rays_.blocked(point, way, kOff_m / length, end)) ++seen;
+      if (!rays_.occluded(point, direction, kRayOffset_m / length, end)) ++seen;
     }
     return static_cast<double>(seen) / kShadowRays;
   }
 
-  double openness(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-    const Basis basis = across(normal);
-    int open = 0;
+  double ambient_visibility(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+    const TangentBasis basis = tangent_basis(normal);
+    int visible = 0;
     for (const Eigen::Vector2d& at : sky_) {
-      const Eigen::Vector3d way =
+      const Eigen::Vector3d direction =
           at.x() * basis.a + at.y() * basis.b + std::sqrt(std::max(0.0, 1 - at.squaredNorm())) * normal;
-      if (!rays_.blocked(point, way, kOff_m, static_cast<float>(kOpenReach_m))) ++open;
+      if (!rays_.occluded(point, direction, kRayOffset_m, static_cast<float>(kOcclusionReach_m))) ++visible;
     }
-    return static_cast<double>(open) / kOpenRays;
+    return static_cast<double>(visible) / kAmbientRays;
   }
 
   const RayCaster& rays_;
   const LightChannels& channels_;
-  std::array<Eigen::Vector2d, kOpenRays> disc_ = spread(kShadowRays), sky_ = spread(kOpenRays);
+  std::array<Eigen::Vector2d, kAmbientRays> disc_ = sunflower_disc(kShadowRays),
+                                            sky_ = sunflower_disc(kAmbientRays);
 };
 
 struct FlatTriangle {
@@ -121,8 +124,8 @@ struct FlatTriangle {
 
 double cross2(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// Weights of the corners for the point of the triangle that is nearest to `p`, about: weights are cut at the
-// borders, which is exact enough for light.
+// Barycentric weights of the point of the triangle that is nearest to `p`. Negative weights are clipped,
+// which is exact enough for light.
 Eigen::Vector3d weights(const FlatTriangle& t, const Eigen::Vector2d& p) {
   const Eigen::Vector2d ab = t.corner[1] - t.corner[0], ac = t.corner[2] - t.corner[0], ap = p - t.corner[0];
   const double area = cross2(ab, ac);
@@ -133,13 +136,13 @@ Eigen::Vector3d weights(const FlatTriangle& t, const Eigen::Vector2d& p) {
   return w / w.sum();
 }
 
-// The nearest place of a patch to a texel's centre.
-struct Place {
+// The point of a patch that is nearest to the centre of a texel.
+struct PatchPoint {
   Eigen::Vector2d at;
   Eigen::Vector3d normal;
 };
-Place nearest_place(const std::vector<FlatTriangle>& triangles, const Eigen::Vector2d& p) {
-  Place best{};
+PatchPoint nearest_point(const std::vector<FlatTriangle>& triangles, const Eigen::Vector2d& p) {
+  PatchPoint best{};
   double least = std::numeric_limits<double>::infinity();
   for (const FlatTriangle& t : triangles) {
     const Eigen::Vector3d w = weights(t, p);
@@ -182,7 +185,7 @@ std::vector<FlatTriangle> flatten(const Mesh& mesh, const std::vector<std::size_
   return flat;
 }
 
-void lay_out(const std::vector<FlatTriangle>& flat, double texel_m, LightMap& map) {
+void set_grid(const std::vector<FlatTriangle>& flat, double texel_m, LightMap& map) {
   Eigen::Vector2d low = flat[0].corner[0], high = low;
   for (const FlatTriangle& t : flat) {
     for (const Eigen::Vector2d& c : t.corner) {
@@ -234,7 +237,7 @@ LightChannels light_channels(const Scene& scene) {
 void bake_lights(const RayCaster& rays, const LightChannels& channels, PartSurfaces& surfaces,
                  ThreadPool& pool) {
   const Mesh& mesh = rays.scene().mesh;
-  const Baker baker(rays, channels);
+  const LightBaker baker(rays, channels);
   const double texel_m = std::clamp(std::sqrt(area_of(mesh) / kTexels), kFinest_m, kCoarsest_m);
   std::vector<std::vector<std::size_t>> triangles(surfaces.patches.size());
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles[surfaces.patch_of[i]].push_back(i);
@@ -243,37 +246,37 @@ void bake_lights(const RayCaster& rays, const LightChannels& channels, PartSurfa
     for (std::size_t k = begin; k < end; ++k) {
       Patch& patch = surfaces.patches[k];
       LightMap& map = patch.light;
-      const Basis basis = across(patch.normal);
+      const TangentBasis basis = tangent_basis(patch.normal);
       map.right = basis.a;
       map.up = basis.b;
       const std::vector<FlatTriangle> flat = flatten(mesh, triangles[k], map);
-      lay_out(flat, texel_m, map);
+      set_grid(flat, texel_m, map);
       const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows;
       map.values.resize(texels * light.size());
       for (std::size_t i = 0; i < texels; ++i) {
         const std::size_t column = i % map.columns, row = i / map.columns;
         const Eigen::Vector2d at(map.right0 + static_cast<double>(column) / map.per_metre,
                                  map.up0 + static_cast<double>(row) / map.per_metre);
-        const Place place = nearest_place(flat, at);
+        const PatchPoint nearest = nearest_point(flat, at);
         const Eigen::Vector3d point =
-            place.at.x() * map.right + place.at.y() * map.up - patch.offset * patch.normal;
-        baker.light_at(point, place.normal, light.data());
+            nearest.at.x() * map.right + nearest.at.y() * map.up - patch.offset * patch.normal;
+        baker.illuminance_at(point, nearest.normal, light.data());
         for (std::size_t c = 0; c < light.size(); ++c) map.values[c * texels + i] = light[c];
       }
     }
   });
 }
 
-void open_light(const Scene& scene, const LightChannels& channels, const Eigen::Vector3d& point,
-                const Eigen::Vector3d& normal, float* by_channel) {
+void unoccluded_light(const Scene& scene, const LightChannels& channels, const Eigen::Vector3d& point,
+                      const Eigen::Vector3d& normal, float* by_channel) {
   std::fill_n(by_channel, channels.switching.size(), 0.0F);
   for (std::size_t i = 0; i < scene.lights.size(); ++i) {
     const Light& light = scene.lights[i];
     double lux = light.strength;
     if (light.kind == LightKind::sun) lux *= std::max(0.0, -normal.dot(light.direction));
     if (light.kind == LightKind::lamp) {
-      const Eigen::Vector3d way = light.position - point;
-      lux *= std::max(0.0, normal.dot(way)) / (way.norm() * way.squaredNorm());
+      const Eigen::Vector3d direction = light.position - point;
+      lux *= std::max(0.0, normal.dot(direction)) / (direction.norm() * direction.squaredNorm());
     }
     by_channel[channels.of_light[i]] += static_cast<float>(lux);
   }

@@ -12,7 +12,7 @@ class ThreadPool;
 
 namespace evpose::sim {
 
-/// Lights that are switched alike share a channel; channel 0 is constant.
+/// Lights with the same switching have one channel; channel 0 is constant.
 struct LightChannels {
   std::vector<LightSwitching> switching;  ///< of each channel
   std::vector<int> of_light;              ///< channel of each light of the scene
@@ -23,13 +23,13 @@ struct LightChannels {
 };
 LightChannels light_channels(const Scene& scene);
 
-/// Light on what stands still: half shadows of lamps and sun, and how much of the surroundings a place sees
-/// (nearby things keep the light from all sides out of corners). Fills the light maps of the patches.
+/// Illuminance of the static surfaces: penumbrae of lamps and sun, and ambient light with the occlusion by
+/// near surfaces (corners are darker). Fills the light maps of the patches.
 void bake_lights(const RayCaster& rays, const LightChannels& channels, PartSurfaces& surfaces,
                  ThreadPool& pool);
 
-/// Illuminance at a place in the map frame, lux by channel, nothing in the way: for moving things.
-void open_light(const Scene& scene, const LightChannels& channels, const Eigen::Vector3d& point,
-                const Eigen::Vector3d& normal, float* by_channel);
+/// Illuminance at a point in the map frame without occlusion, lux by channel; for moving parts.
+void unoccluded_light(const Scene& scene, const LightChannels& channels, const Eigen::Vector3d& point,
+                      const Eigen::Vector3d& normal, float* by_channel);
 
 }  // namespace evpose::sim

@@ -32,13 +32,13 @@ Expected<std::vector<PixelRay>> pixel_rays(const Camera& camera) {
   return rays;
 }
 
-float share_above(float level, Eigen::Vector2f slope) {
+float fraction_above(float level, Eigen::Vector2f slope) {
   float a = std::abs(slope.x()), b = std::abs(slope.y());
   if (a < b) std::swap(a, b);
   if (!(a > 0)) return level > 0 ? 1.0F : 0.0F;
   level /= a;
   b /= a;
-  // The sum of two even distributions of widths 1 and b.
+  // The sum of two uniform distributions of widths 1 and b.
   if (level >= 0.5F * (1 + b)) return 1;
   if (level <= -0.5F * (1 + b)) return 0;
   if (std::abs(level) <= 0.5F * (1 - b)) return 0.5F + level;

@@ -9,8 +9,8 @@
 
 namespace evpose::sim {
 
-/// What a pixel looks along: (x, y, 1) in the camera frame, and its change from pixel to pixel. A pixel's
-/// area is taken as the parallelogram that these span.
+/// Ray of a pixel, (x, y, 1) in the camera frame, and its derivative by column and row. The area of a pixel
+/// is the parallelogram that the derivatives span.
 struct PixelRay {
   Eigen::Vector2f at, per_column, per_row;
 
@@ -21,10 +21,10 @@ struct PixelRay {
   }
 };
 
-/// Row by row. Errors: a lens that looks beyond 89 degrees from its axis at some pixel.
+/// Row by row. Errors: a lens with a pixel beyond 89 degrees from the optical axis.
 Expected<std::vector<PixelRay>> pixel_rays(const Camera& camera);
 
-/// Share of a pixel's area where level + slope.x x + slope.y y > 0; x, y from -1/2 to 1/2.
-float share_above(float level, Eigen::Vector2f slope);
+/// Fraction of the area of a pixel where level + slope.x x + slope.y y > 0; x, y from -1/2 to 1/2.
+float fraction_above(float level, Eigen::Vector2f slope);
 
 }  // namespace evpose::sim

@@ -150,8 +150,8 @@ void RayCaster::trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen
   }
 }
 
-bool RayCaster::blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near,
-                        float far) const {
+bool RayCaster::occluded(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near,
+                         float far) const {
   RTCRay ray = make_ray(origin, direction, near, far);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);

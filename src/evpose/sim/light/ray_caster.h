@@ -17,22 +17,22 @@ namespace evpose::sim {
 /// Where a ray meets a surface: origin + distance * direction.
 struct RayHit {
   float distance;          ///< in lengths of the direction
-  std::int32_t part;       ///< -1: what stands still; else number in Scene::moving
+  std::int32_t part;       ///< -1: static; else number in Scene::moving
   std::uint32_t triangle;  ///< of the part's mesh
 };
 
-/// Rays in a scene, by Embree. May be used from several threads at once.
+/// Ray casting in a scene by Embree. May be used from several threads at once.
 class RayCaster {
  public:
   /// Keeps a reference.
   explicit RayCaster(const Scene& scene);
   ~RayCaster();
 
-  /// First surface in (near, far), lengths of `direction`, of what stands still. Map frame.
+  /// First static surface in (near, far), in lengths of `direction`. Map frame.
   std::optional<RayHit> trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near = 0,
                               float far = std::numeric_limits<float>::infinity()) const;
-  /// Rays from one place, of which neighbours go much the same way: what trace() says of each, faster.
-  /// `triangle` is kNoTriangle where nothing is met.
+  /// Traces coherent rays from one origin; the same results as trace(), faster. `triangle` is kNoTriangle
+  /// where nothing is hit.
   static constexpr std::uint32_t kNoTriangle = 0xFFFFFFFF;
   struct BatchHit {
     float distance;
@@ -40,17 +40,17 @@ class RayCaster {
   };
   void trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
                    std::span<BatchHit> hits) const;
-  /// Where the moving parts stand at a time: T_map_part of each.
+  /// Poses of the moving parts at a time: T_map_part of each.
   std::vector<Pose> parts_at(double t_s) const;
-  /// Moving parts too, as they stand.
+  /// First surface, moving parts included.
   std::optional<RayHit> trace(const std::vector<Pose>& T_map_part, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, float near = 0,
                               float far = std::numeric_limits<float>::infinity()) const;
   /// One part alone, in its own frame.
   std::optional<RayHit> trace_part(int part, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                    float near, float far) const;
-  /// True if what stands still covers the way.
-  bool blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near, float far) const;
+  /// True if a static surface lies in between.
+  bool occluded(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near, float far) const;
 
   const Scene& scene() const { return scene_; }
 

@@ -21,15 +21,15 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kCrease = 10 * kPi / 180;
-/// Around a point of an edge a ring of so many chords, this far out, is searched for surfaces. Prints, which
-/// lie 0.6 mm over theirs, bend it by 7 degrees and are no contour.
-constexpr double kReach_m = 5e-3;
+/// Radius and number of chords of the ring around an edge point in which surfaces are searched. Prints, which
+/// lie 0.6 mm above their surface, bend it by 7 degrees and are no contour.
+constexpr double kRingRadius_m = 5e-3;
 constexpr int kChords = 24;
-constexpr double kNarrow = 8 * kPi / 180;  // gaps, such as that under the rim of a print
-constexpr double kRim = 2 * kPi - 12 * kPi / 180;
+constexpr double kNarrowestGap = 8 * kPi / 180;  // gaps, such as that under the rim of a print
+constexpr double kBoundaryAngle = 2 * kPi - 12 * kPi / 180;
 
-// Places in the free space from which everything that counts can be seen.
-std::vector<Eigen::Vector3d> view_points(const Scene& scene, const RayCaster& rays) {
+// Points of the free space from which every contour that counts is visible.
+std::vector<Eigen::Vector3d> free_viewpoints(const Scene& scene, const RayCaster& rays) {
   const Eigen::Vector3d size = scene.high - scene.low;
   std::array<int, 3> count{};
   const double step = std::cbrt(std::max(1e-3, size.prod()) / 120);
@@ -39,55 +39,56 @@ std::vector<Eigen::Vector3d> view_points(const Scene& scene, const RayCaster& ra
   for (int i = 0; i < count[0]; ++i)
     for (int j = 0; j < count[1]; ++j)
       for (int k = 0; k < count[2]; ++k) {
-        const Eigen::Vector3d share(i / (count[0] - 1.0), j / (count[1] - 1.0), k / (count[2] - 1.0));
-        const Eigen::Vector3d p = scene.low + share.cwiseProduct(size);
-        // Inside a body mostly backs are seen.
+        const Eigen::Vector3d fraction(i / (count[0] - 1.0), j / (count[1] - 1.0), k / (count[2] - 1.0));
+        const Eigen::Vector3d p = scene.low + fraction.cwiseProduct(size);
+        // Inside a body most rays hit back faces.
         int backs = 0, hits = 0;
         for (int a = 0; a < 26; ++a) {
           const double z = (a + 0.5) / 13 - 1, turn = 2.39996 * a;
-          const Eigen::Vector3d way(std::sqrt(1 - z * z) * std::cos(turn),
-                                    std::sqrt(1 - z * z) * std::sin(turn), z);
-          const auto hit = rays.trace(p, way);
+          const Eigen::Vector3d direction(std::sqrt(1 - z * z) * std::cos(turn),
+                                          std::sqrt(1 - z * z) * std::sin(turn), z);
+          const auto hit = rays.trace(p, direction);
           if (!hit) continue;
           ++hits;
-          if (triangle_normal(scene.mesh, hit->triangle).dot(way) > 0) ++backs;
+          if (triangle_normal(scene.mesh, hit->triangle).dot(direction) > 0) ++backs;
         }
         if (2 * backs <= hits) points.push_back(p);
       }
   return points;
 }
 
-class Prober {
+class ContourProber {
  public:
-  Prober(const Scene& scene, const RayCaster& rays, const MeshEdges& edges)
-      : scene_(scene), rays_(rays), edges_(edges), views_(view_points(scene, rays)) {}
+  ContourProber(const Scene& scene, const RayCaster& rays, const MeshEdges& edges)
+      : scene_(scene), rays_(rays), edges_(edges), viewpoints_(free_viewpoints(scene, rays)) {}
 
-  /// Contour points of a run, each where the run is a contour; contour numbers from 0.
-  std::vector<ContourPoint> probe(const EdgeRun& run, double spacing_m) const {
-    std::vector<double> upto = {0};
-    for (std::size_t i = 1; i < run.points.size(); ++i)
-      upto.push_back(upto.back() + (run.points[i] - run.points[i - 1]).norm());
-    const double length = upto.back();
+  /// Contour points of a chain where it is a contour; contour numbers from 0.
+  std::vector<ContourPoint> probe(const EdgeChain& chain, double spacing_m) const {
+    std::vector<double> arc_length = {0};
+    for (std::size_t i = 1; i < chain.points.size(); ++i)
+      arc_length.push_back(arc_length.back() + (chain.points[i] - chain.points[i - 1]).norm());
+    const double length = arc_length.back();
     std::vector<ContourPoint> out;
     if (length <= 0) return out;
-    std::vector<Eigen::Vector3d> views = views_;
-    const Eigen::Vector3d middle = run.points[run.points.size() / 2];
-    std::stable_sort(views.begin(), views.end(), [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-      return (a - middle).squaredNorm() < (b - middle).squaredNorm();
-    });
+    std::vector<Eigen::Vector3d> candidates = viewpoints_;
+    const Eigen::Vector3d middle = chain.points[chain.points.size() / 2];
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+                       return (a - middle).squaredNorm() < (b - middle).squaredNorm();
+                     });
     const int count = std::max(1, static_cast<int>(std::lround(length / spacing_m)));
     std::size_t segment = 1;
     int last = -2;
     for (int i = 0; i < count; ++i) {
       const double at = (i + 0.5) / count * length;
-      while (upto[segment] < at) ++segment;
-      const Eigen::Vector3d from = run.points[segment - 1], to = run.points[segment];
-      const double along = (at - upto[segment - 1]) / (upto[segment] - upto[segment - 1]);
-      auto point = look_at(from + along * (to - from), (to - from).normalized(), views);
+      while (arc_length[segment] < at) ++segment;
+      const Eigen::Vector3d from = chain.points[segment - 1], to = chain.points[segment];
+      const double along = (at - arc_length[segment - 1]) / (arc_length[segment] - arc_length[segment - 1]);
+      auto point = classify_point(from + along * (to - from), (to - from).normalized(), candidates);
       if (!point) continue;
-      const bool goes_on = last == i - 1 && !out.empty() && out.back().plane_a == point->plane_a &&
-                           out.back().plane_b == point->plane_b;
-      point->contour = out.empty() ? 0 : out.back().contour + (goes_on ? 0 : 1);
+      const bool continues = last == i - 1 && !out.empty() && out.back().plane_a == point->plane_a &&
+                             out.back().plane_b == point->plane_b;
+      point->contour = out.empty() ? 0 : out.back().contour + (continues ? 0 : 1);
       point->length = static_cast<float>(length / count);
       out.push_back(*point);
       last = i;
@@ -100,30 +101,30 @@ class Prober {
     double angle;  // rad, about the edge
     std::uint32_t triangle;
   };
-  struct Cut {  // the plane across the edge
+  struct CrossSection {  // the plane perpendicular to the edge
     Eigen::Vector3d point, tangent, a, b;
     Eigen::Vector3d direction(double angle) const { return std::cos(angle) * a + std::sin(angle) * b; }
   };
 
-  std::optional<ContourPoint> look_at(const Eigen::Vector3d& point, const Eigen::Vector3d& tangent,
-                                      std::vector<Eigen::Vector3d>& views) const {
+  std::optional<ContourPoint> classify_point(const Eigen::Vector3d& point, const Eigen::Vector3d& tangent,
+                                             std::vector<Eigen::Vector3d>& candidates) const {
     const Eigen::Vector3d other =
         std::abs(tangent.z()) < 0.7 ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitX();
     const Eigen::Vector3d a = tangent.cross(other).normalized();
-    const Cut cut{point, tangent, a, tangent.cross(a)};
-    const std::vector<Crossing> crossings = ring(cut);
+    const CrossSection section{point, tangent, a, tangent.cross(a)};
+    const std::vector<Crossing> crossings = ring_crossings(section);
     for (std::size_t i = 0; i < crossings.size(); ++i) {
       const Crossing& begin = crossings[i];
       const Crossing& end = crossings[(i + 1) % crossings.size()];
       const double width = end.angle - begin.angle + (i + 1 == crossings.size() ? 2 * kPi : 0);
-      if (width < kNarrow || std::abs(width - kPi) < kCrease) continue;
-      if (!seen(cut, begin.angle, width, views)) continue;
+      if (width < kNarrowestGap || std::abs(width - kPi) < kCrease) continue;
+      if (!is_visible(section, begin.angle, width, candidates)) continue;
       ContourPoint p;
       p.position = point.cast<float>();
       p.tangent = tangent.cast<float>();
-      p.normal = (-away(cut, begin)).cast<float>();
+      p.normal = (-into_surface(section, begin)).cast<float>();
       p.plane_a = edges_.surface_of[begin.triangle];
-      const bool rim = width > kRim;
+      const bool rim = width > kBoundaryAngle;
       p.kind = rim ? ContourKind::boundary : ContourKind::crease;
       if (!rim) p.plane_b = edges_.surface_of[end.triangle];
       return p;
@@ -131,21 +132,22 @@ class Prober {
     return std::nullopt;
   }
 
-  // The surfaces that go out from the edge, counterclockwise.
-  std::vector<Crossing> ring(const Cut& cut) const {
+  // The surfaces that meet at the edge, counterclockwise.
+  std::vector<Crossing> ring_crossings(const CrossSection& section) const {
     std::vector<Crossing> found;
     const double step = 2 * kPi / kChords;
     for (int i = 0; i < kChords; ++i) {
-      // A start off the usual right angles: no surface runs through the ring's corners.
+      // The start avoids right angles, so that no surface chains through a corner of the ring.
       const double angle = (i + 0.37) * step;
-      const Eigen::Vector3d from = cut.point + kReach_m * cut.direction(angle),
-                            way = cut.point + kReach_m * cut.direction(angle + step) - from;
+      const Eigen::Vector3d from = section.point + kRingRadius_m * section.direction(angle),
+                            direction =
+                                section.point + kRingRadius_m * section.direction(angle + step) - from;
       float near = 0;
       for (int hits = 0; hits < 6; ++hits) {
-        const auto hit = rays_.trace(from, way, near, 1);
+        const auto hit = rays_.trace(from, direction, near, 1);
         if (!hit) break;
-        const Eigen::Vector3d at = from + static_cast<double>(hit->distance) * way - cut.point;
-        double turn = std::atan2(at.dot(cut.b), at.dot(cut.a)) - 0.37 * step;
+        const Eigen::Vector3d at = from + static_cast<double>(hit->distance) * direction - section.point;
+        double turn = std::atan2(at.dot(section.b), at.dot(section.a)) - 0.37 * step;
         if (turn < 0) turn += 2 * kPi;
         found.push_back({turn + 0.37 * step, hit->triangle});
         near = hit->distance + 2e-3F;
@@ -156,22 +158,24 @@ class Prober {
     return found;
   }
 
-  // Unit, across the edge, into the surface.
-  Eigen::Vector3d away(const Cut& cut, const Crossing& crossing) const {
+  // Unit vector perpendicular to the edge, into the surface.
+  Eigen::Vector3d into_surface(const CrossSection& section, const Crossing& crossing) const {
     const Eigen::Vector3d direction =
-        cut.tangent.cross(triangle_normal(scene_.mesh, crossing.triangle)).normalized();
-    return direction.dot(cut.direction(crossing.angle)) < 0 ? Eigen::Vector3d(-direction) : direction;
+        section.tangent.cross(triangle_normal(scene_.mesh, crossing.triangle)).normalized();
+    return direction.dot(section.direction(crossing.angle)) < 0 ? Eigen::Vector3d(-direction) : direction;
   }
 
-  // True if one of the views looks into the sector. The one that does comes first next time.
-  bool seen(const Cut& cut, double begin, double width, std::vector<Eigen::Vector3d>& views) const {
+  // True if the sector is visible from one of the viewpoints, which is then tried first the next time.
+  bool is_visible(const CrossSection& section, double begin, double width,
+                  std::vector<Eigen::Vector3d>& candidates) const {
     const int tries = width > 0.6 * kPi ? 3 : 1;
     for (int k = 0; k < tries; ++k) {
-      const double share = k == 0 ? 0.5 : k == 1 ? 0.2 : 0.8;
-      const Eigen::Vector3d from = cut.point + kReach_m * cut.direction(begin + share * width);
-      for (std::size_t v = 0; v < views.size(); ++v) {
-        if (rays_.blocked(from, views[v] - from, 0, 1)) continue;
-        std::swap(views[0], views[v]);
+      const double fraction = k == 0 ? 0.5 : k == 1 ? 0.2 : 0.8;
+      const Eigen::Vector3d from =
+          section.point + kRingRadius_m * section.direction(begin + fraction * width);
+      for (std::size_t v = 0; v < candidates.size(); ++v) {
+        if (rays_.occluded(from, candidates[v] - from, 0, 1)) continue;
+        std::swap(candidates[0], candidates[v]);
         return true;
       }
     }
@@ -181,13 +185,13 @@ class Prober {
   const Scene& scene_;
   const RayCaster& rays_;
   const MeshEdges& edges_;
-  std::vector<Eigen::Vector3d> views_;
+  std::vector<Eigen::Vector3d> viewpoints_;
 };
 
-/// Keeps edges of several bodies that lie on each other from being taken twice.
-class Taken {
+/// Finds contour points of coincident edges of several bodies, so that each is kept once.
+class DuplicateFilter {
  public:
-  explicit Taken(double spacing_m) : cell_(std::max(spacing_m, 5e-3)) {}
+  explicit DuplicateFilter(double spacing_m) : cell_(std::max(spacing_m, 5e-3)) {}
 
   bool has(const ContourPoint& p) const {
     const Eigen::Array3d place = (p.position.cast<double>() / cell_).array().floor();
@@ -222,28 +226,28 @@ class Taken {
 
 ContourMap make_contours(const Scene& scene, const RayCaster& rays, double spacing_m, ThreadPool& pool) {
   const MeshEdges edges = find_edges(scene.mesh, kCrease);
-  const Prober prober(scene, rays, edges);
-  std::vector<std::vector<ContourPoint>> by_run(edges.runs.size());
-  pool.for_chunks(edges.runs.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) by_run[i] = prober.probe(edges.runs[i], spacing_m);
+  const ContourProber prober(scene, rays, edges);
+  std::vector<std::vector<ContourPoint>> by_chain(edges.chains.size());
+  pool.for_chunks(edges.chains.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) by_chain[i] = prober.probe(edges.chains[i], spacing_m);
   });
 
   ContourMap map;
-  Taken taken(spacing_m);
+  DuplicateFilter duplicates(spacing_m);
   std::int32_t contours = 0;
-  for (const std::vector<ContourPoint>& run : by_run) {
+  for (const std::vector<ContourPoint>& chain : by_chain) {
     const std::size_t first = map.points.size();
-    std::int32_t in_run = -1;
-    for (const ContourPoint& point : run) {
-      if (taken.has(point)) {
-        in_run = -1;
+    std::int32_t in_chain = -1;
+    for (const ContourPoint& point : chain) {
+      if (duplicates.has(point)) {
+        in_chain = -1;
         continue;
       }
       map.points.push_back(point);
-      map.points.back().contour = point.contour == in_run ? contours - 1 : contours++;
-      in_run = point.contour;
+      map.points.back().contour = point.contour == in_chain ? contours - 1 : contours++;
+      in_chain = point.contour;
     }
-    for (std::size_t i = first; i < map.points.size(); ++i) taken.add(map.points[i]);
+    for (std::size_t i = first; i < map.points.size(); ++i) duplicates.add(map.points[i]);
   }
   map.occluders.vertices = scene.mesh.vertices;
   map.occluders.triangles = scene.mesh.triangles;

@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <unordered_map>
+#include <utility>
+
+#include "evpose/sim/world/disjoint_sets.h"
 
 namespace evpose::sim {
 namespace {
@@ -16,26 +18,8 @@ constexpr double kSamePlace_m = 1e-5;
 constexpr double kSameTexture_m = 1e-4;
 constexpr double kSameNormal = 1e-5;  // 1 - cosine: 0.26 degrees
 
-class Sets {
- public:
-  explicit Sets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
-  std::size_t root(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  // The lower number stays the root, so that the order of patches is that of the mesh.
-  void join(std::size_t a, std::size_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::size_t> parent_;
-};
-
-// Numbers of places: vertices at the same place have the same.
-std::vector<std::uint32_t> weld(const std::vector<Eigen::Vector3f>& vertices) {
+// Number of each vertex; vertices at the same position have the same number.
+std::vector<std::uint32_t> weld_vertices(const std::vector<Eigen::Vector3f>& vertices) {
   std::map<std::array<std::int64_t, 3>, std::uint32_t> places;
   std::vector<std::uint32_t> welded(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -46,7 +30,7 @@ std::vector<std::uint32_t> weld(const std::vector<Eigen::Vector3f>& vertices) {
   return welded;
 }
 
-Patch plane_of(const Mesh& mesh, std::size_t triangle) {
+Patch triangle_patch(const Mesh& mesh, std::size_t triangle) {
   const Mesh::Corners& corners = mesh.triangles[triangle];
   const Eigen::Vector3d a = mesh.vertices[corners[0]].cast<double>(),
                         b = mesh.vertices[corners[1]].cast<double>(),
@@ -55,7 +39,7 @@ Patch plane_of(const Mesh& mesh, std::size_t triangle) {
   const Eigen::Vector3d ab = b - a, ac = c - a, cross = ab.cross(ac);
   const double area2 = cross.norm();
   patch.normal = area2 > 0 ? Eigen::Vector3d(cross / area2) : Eigen::Vector3d::UnitZ();
-  // Corner normals say which side is out.
+  // Corner normals tell the outside.
   if (patch.normal.dot(mesh.normals[triangle][0].cast<double>()) < 0) patch.normal = -patch.normal;
   patch.offset = -patch.normal.dot(a);
   // Gradient of a function given at the corners, within the plane.
@@ -74,53 +58,76 @@ Patch plane_of(const Mesh& mesh, std::size_t triangle) {
   return patch;
 }
 
-struct Side {
+struct EdgeSide {
   std::size_t triangle;
   int edge;
 };
+using VertexPair = std::pair<std::uint32_t, std::uint32_t>;
+using EdgeSides = std::map<VertexPair, std::vector<EdgeSide>>;
 
-}  // namespace
-
-PartSurfaces order_surfaces(const Mesh& mesh, std::int32_t& first) {
-  const std::size_t n = mesh.triangles.size();
-  const std::vector<std::uint32_t> place = weld(mesh.vertices);
-  std::vector<Patch> planes;
-  planes.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) planes.push_back(plane_of(mesh, i));
-
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Side>> sides;
-  for (std::size_t i = 0; i < n; ++i) {
+// The triangles on both sides of each edge.
+EdgeSides collect_edge_sides(const Mesh& mesh, const std::vector<std::uint32_t>& place) {
+  EdgeSides sides;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     for (int e = 0; e < 3; ++e) {
       const std::uint32_t a = place[mesh.triangles[i][e]], b = place[mesh.triangles[i][(e + 1) % 3]];
       sides[{std::min(a, b), std::max(a, b)}].push_back({i, e});
     }
   }
+  return sides;
+}
 
-  Sets patches(n), groups(n), surfaces(n);
+struct EdgeContinuity {
+  bool normal = true, texture = true;
+};
+
+// What continues across the edge that two triangles have in common.
+EdgeContinuity edge_continuity(const Mesh& mesh, const std::vector<std::uint32_t>& place, const EdgeSide& p,
+                               const EdgeSide& q) {
+  // The common corners in both triangles.
+  const std::array<int, 2> in_p{p.edge, (p.edge + 1) % 3};
+  std::array<int, 2> in_q{q.edge, (q.edge + 1) % 3};
+  if (place[mesh.triangles[p.triangle][in_p[0]]] != place[mesh.triangles[q.triangle][in_q[0]]])
+    std::swap(in_q[0], in_q[1]);
+  EdgeContinuity out;
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Vector3f &normal_p = mesh.normals[p.triangle][in_p[k]],
+                          &normal_q = mesh.normals[q.triangle][in_q[k]];
+    const Eigen::Vector2f &uv_p = mesh.uv[p.triangle][in_p[k]], &uv_q = mesh.uv[q.triangle][in_q[k]];
+    out.normal = out.normal && 1 - normal_p.dot(normal_q) < static_cast<float>(kSameNormal);
+    out.texture = out.texture && (uv_p - uv_q).norm() < static_cast<float>(kSameTexture_m);
+  }
+  return out;
+}
+
+bool have_same_mapping(const Patch& p, const Patch& q) {
+  const bool flat = 1 - p.normal.dot(q.normal) < 1e-9;
+  return flat && (p.u_axis - q.u_axis).norm() < 1e-3 && (p.v_axis - q.v_axis).norm() < 1e-3;
+}
+
+}  // namespace
+
+PartSurfaces segment_surfaces(const Mesh& mesh, std::int32_t& first) {
+  const std::size_t n = mesh.triangles.size();
+  const std::vector<std::uint32_t> place = weld_vertices(mesh.vertices);
+  std::vector<Patch> planes;
+  planes.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) planes.push_back(triangle_patch(mesh, i));
+
+  DisjointSets patches(n), groups(n), surfaces(n);
   PartSurfaces out;
   out.edges.assign(n, 7);
-  for (const auto& [key, two] : sides) {
-    if (two.size() != 2 || key.first == key.second) continue;
-    const auto [p, e] = two[0];
-    const auto [q, f] = two[1];
-    // The shared corners in both triangles.
-    std::array<int, 2> in_p{e, (e + 1) % 3}, in_q{f, (f + 1) % 3};
-    if (place[mesh.triangles[p][in_p[0]]] != place[mesh.triangles[q][in_q[0]]]) std::swap(in_q[0], in_q[1]);
-    bool same_normal = true, same_texture = planes[p].material == planes[q].material;
-    for (int k = 0; k < 2; ++k) {
-      same_normal = same_normal && 1 - mesh.normals[p][in_p[k]].dot(mesh.normals[q][in_q[k]]) <
-                                       static_cast<float>(kSameNormal);
-      same_texture = same_texture &&
-                     (mesh.uv[p][in_p[k]] - mesh.uv[q][in_q[k]]).norm() < static_cast<float>(kSameTexture_m);
-    }
-    if (!same_normal) continue;
+  for (const auto& [key, sides] : collect_edge_sides(mesh, place)) {
+    if (sides.size() != 2 || key.first == key.second) continue;
+    const auto [p, e] = sides[0];
+    const auto [q, f] = sides[1];
+    const EdgeContinuity same = edge_continuity(mesh, place, sides[0], sides[1]);
+    if (!same.normal) continue;
     surfaces.join(p, q);
-    if (planes[p].object != planes[q].object || !same_texture) continue;
+    if (planes[p].object != planes[q].object || planes[p].material != planes[q].material || !same.texture)
+      continue;
     groups.join(p, q);
-    const bool flat = 1 - planes[p].normal.dot(planes[q].normal) < 1e-9;
-    const bool same_mapping = (planes[p].u_axis - planes[q].u_axis).norm() < 1e-3 &&
-                              (planes[p].v_axis - planes[q].v_axis).norm() < 1e-3;
-    if (!flat || !same_mapping) continue;
+    if (!have_same_mapping(planes[p], planes[q])) continue;
     patches.join(p, q);
     out.edges[p] = static_cast<std::uint8_t>(out.edges[p] & ~(1 << e));
     out.edges[q] = static_cast<std::uint8_t>(out.edges[q] & ~(1 << f));

@@ -14,16 +14,16 @@ constexpr int kBisections = 5;  // of half a pixel: to 1/128
 
 }  // namespace
 
-Border border_of(const Stage& stage, const View& view, const PixelSample& sample) {
+Border border_of(const PreparedScene& prepared, const SceneView& view, const PixelSample& sample) {
   if (sample.edge == kPlanes) {
-    const PatchView a = view_patch(view, stage.still.patches[sample.a], -1),
-                    b = view_patch(view, stage.still.patches[sample.b], -1);
+    const PatchView a = make_patch_view(view, prepared.still.patches[sample.a], -1),
+                    b = make_patch_view(view, prepared.still.patches[sample.b], -1);
     // The plane through the camera and the line where the two planes meet.
     const Eigen::Vector3d through = static_cast<double>(b.reach) * a.normal.cast<double>() -
                                     static_cast<double>(a.reach) * b.normal.cast<double>();
     return {through};
   }
-  const Mesh& mesh = stage.mesh_of(sample.edge_part);
+  const Mesh& mesh = prepared.mesh_of(sample.edge_part);
   const Mesh::Corners& corners = mesh.triangles[sample.a];
   const Pose& T_part_cam = sample.edge_part < 0 ? view.T_map_cam : view.T_part_cam[sample.edge_part];
   const Eigen::Vector3d p = mesh.vertices[corners[sample.edge]].cast<double>() - T_part_cam.p;
@@ -33,7 +33,7 @@ Border border_of(const Stage& stage, const View& view, const PixelSample& sample
 
 TileSampler::Hit TileSampler::hit_of(std::uint32_t triangle, float depth, int part) const {
   Hit hit;
-  const PartSurfaces& surfaces = stage_.surfaces_of(part);
+  const PartSurfaces& surfaces = prepared_.surfaces_of(part);
   hit.patch = surfaces.patch_of[triangle];
   hit.group = surfaces.patches[hit.patch].group;
   hit.part = part;
@@ -42,7 +42,7 @@ TileSampler::Hit TileSampler::hit_of(std::uint32_t triangle, float depth, int pa
   return hit;
 }
 
-// Moving parts that may touch the pixel.
+// Moving parts that may cover the pixel.
 void TileSampler::find_movers(int x, int y) {
   movers_.clear();
   const int column = plan_->tile.x0 + x, row = plan_->tile.y0 + y;
@@ -56,31 +56,31 @@ void TileSampler::add_movers(const PixelRay& ray, float x, float y, Hit& hit) co
   for (const int part : movers_) {
     const Pose& T_part_cam = view_->T_part_cam[part];
     const float far = hit.group == kSky ? std::numeric_limits<float>::infinity() : hit.depth;
-    const auto closer = stage_.rays.trace_part(part, T_part_cam.p, T_part_cam.q * in_camera, 0, far);
+    const auto closer = prepared_.rays.trace_part(part, T_part_cam.p, T_part_cam.q * in_camera, 0, far);
     if (closer) hit = hit_of(closer->triangle, closer->distance, part);
   }
 }
 
 TileSampler::Hit TileSampler::trace(const PixelRay& ray, float x, float y) const {
   const auto found =
-      stage_.rays.trace(view_->T_map_cam.p, view_->R_map_cam * ray.direction(x, y).cast<double>());
+      prepared_.rays.trace(view_->T_map_cam.p, view_->R_map_cam * ray.direction(x, y).cast<double>());
   Hit hit = found ? hit_of(found->triangle, found->distance, -1) : Hit{};
   add_movers(ray, x, y, hit);
   hit.at = {x, y};
   return hit;
 }
 
-// Rays of one sample of a tile, together.
+// The rays of one sample of a tile.
 struct TileSampler::Batch {
   static constexpr std::size_t kMost = static_cast<std::size_t>(kCorners) * kCorners;
   std::size_t n = 0;
-  std::array<Eigen::Vector3f, kMost> ways;
-  std::array<std::uint16_t, kMost> places;
+  std::array<Eigen::Vector3f, kMost> directions;
+  std::array<std::uint16_t, kMost> slots;
   std::array<RayCaster::BatchHit, kMost> hits;
 
-  void add(std::size_t place, const Eigen::Matrix3d& R_map_cam, const Eigen::Vector3f& in_camera) {
-    ways[n] = (R_map_cam * in_camera.cast<double>()).cast<float>();
-    places[n++] = static_cast<std::uint16_t>(place);
+  void add(std::size_t slot, const Eigen::Matrix3d& R_map_cam, const Eigen::Vector3f& in_camera) {
+    directions[n] = (R_map_cam * in_camera.cast<double>()).cast<float>();
+    slots[n++] = static_cast<std::uint16_t>(slot);
   }
 };
 
@@ -94,13 +94,13 @@ void TileSampler::trace_centres() {
         batch.add(i, view_->R_map_cam, ray(tile.x0 + x, tile.y0 + y).direction());
       } else {
         centres_[i] = {};
-        if (plan_->patch[i] >= 0) centres_[i].group = stage_.still.patches[plan_->patch[i]].group;
+        if (plan_->patch[i] >= 0) centres_[i].group = prepared_.still.patches[plan_->patch[i]].group;
       }
     }
   }
-  stage_.rays.trace_batch(view_->T_map_cam.p, {batch.ways.data(), batch.n}, batch.hits);
+  prepared_.rays.trace_batch(view_->T_map_cam.p, {batch.directions.data(), batch.n}, batch.hits);
   for (std::size_t k = 0; k < batch.n; ++k) {
-    const std::size_t i = batch.places[k];
+    const std::size_t i = batch.slots[k];
     const RayCaster::BatchHit& found = batch.hits[k];
     Hit& hit = centres_[i];
     hit = found.triangle == RayCaster::kNoTriangle ? Hit{} : hit_of(found.triangle, found.distance, -1);
@@ -110,7 +110,7 @@ void TileSampler::trace_centres() {
   }
 }
 
-// True if another group is next to the pixel, or may be: neighbours in other tiles are not known.
+// True if a neighbouring pixel shows another group, or may do so: neighbours in other tiles are unknown.
 bool TileSampler::near_border(int x, int y) const {
   const Tile& tile = plan_->tile;
   if (x == 0 || y == 0 || x + 1 == tile.width || y + 1 == tile.height) return true;
@@ -129,13 +129,14 @@ void TileSampler::trace_corners() {
   for (int y = 0; y < tile.height; ++y) {
     for (int x = 0; x < tile.width; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
-      at_border_[i] = plan_->pixel[i] == PixelClass::open && near_border(x, y);
+      at_border_[i] = plan_->pixel[i] == PixelClass::mixed && near_border(x, y);
       if (!at_border_[i]) continue;
       const std::size_t c = static_cast<std::size_t>(y) * kCorners + x;
       wanted[c] = wanted[c + 1] = wanted[c + kCorners] = wanted[c + kCorners + 1] = true;
     }
   }
-  // A corner is the upper left one of its pixel; at the tile's end, a right or lower one of the last.
+  // A corner is the upper left one of its pixel, or at the end of the tile a right or lower one of the last
+  // pixel.
   const auto pixel_of = [&](std::size_t c) {
     return std::array<int, 2>{std::min(static_cast<int>(c % kCorners), tile.width - 1),
                               std::min(static_cast<int>(c / kCorners), tile.height - 1)};
@@ -150,9 +151,9 @@ void TileSampler::trace_corners() {
     const Eigen::Vector2f at = offset_of(c, pixel);
     batch.add(c, view_->R_map_cam, ray(tile.x0 + pixel[0], tile.y0 + pixel[1]).direction(at.x(), at.y()));
   }
-  stage_.rays.trace_batch(view_->T_map_cam.p, {batch.ways.data(), batch.n}, batch.hits);
+  prepared_.rays.trace_batch(view_->T_map_cam.p, {batch.directions.data(), batch.n}, batch.hits);
   for (std::size_t k = 0; k < batch.n; ++k) {
-    const std::size_t c = batch.places[k];
+    const std::size_t c = batch.slots[k];
     const RayCaster::BatchHit& found = batch.hits[k];
     Hit& hit = corners_[c];
     hit = found.triangle == RayCaster::kNoTriangle ? Hit{} : hit_of(found.triangle, found.distance, -1);
@@ -164,8 +165,8 @@ void TileSampler::trace_corners() {
   }
 }
 
-// The pixel's centre and its corners, row by row.
-std::array<TileSampler::Hit, 5> TileSampler::around(int x, int y) const {
+// Hits of the centre and the corners of the pixel, corners row by row.
+std::array<TileSampler::Hit, 5> TileSampler::centre_and_corners(int x, int y) const {
   const std::size_t c = static_cast<std::size_t>(y) * kCorners + x;
   std::array<Hit, 5> hits{centres_[static_cast<std::size_t>(y) * kTilePx + x], corners_[c], corners_[c + 1],
                           corners_[c + kCorners], corners_[c + kCorners + 1]};
@@ -175,29 +176,29 @@ std::array<TileSampler::Hit, 5> TileSampler::around(int x, int y) const {
 }
 
 const PatchView& TileSampler::patch_view(int part, std::int32_t patch) {
-  const Patch* wanted = &stage_.surfaces_of(part).patches[patch];
+  const Patch* wanted = &prepared_.surfaces_of(part).patches[patch];
   if (last_view_ < patch_views_.size() && patch_views_[last_view_].patch == wanted)
     return patch_views_[last_view_];
   for (last_view_ = 0; last_view_ < patch_views_.size(); ++last_view_) {
     if (patch_views_[last_view_].patch == wanted) return patch_views_[last_view_];
   }
-  patch_views_.push_back(view_patch(*view_, *wanted, part));
+  patch_views_.push_back(make_patch_view(*view_, *wanted, part));
   return patch_views_.back();
 }
 
 float TileSampler::shade(const Hit& hit, const PixelRay& ray, float x, float y) {
-  if (hit.group == kSky) return static_cast<float>(stage_.scene.sky_cd_m2);
-  return luminance(stage_, *view_, patch_view(hit.part, hit.patch), ray, x, y);
+  if (hit.group == kSky) return static_cast<float>(prepared_.scene.sky_cd_m2);
+  return luminance(prepared_, *view_, patch_view(hit.part, hit.patch), ray, x, y);
 }
 
-void TileSampler::describe_hit(const Hit& hit, PixelSample& out) const {
+void TileSampler::copy_hit(const Hit& hit, PixelSample& out) const {
   out.group = hit.group;
   out.part = static_cast<std::int8_t>(hit.part);
   if (hit.group != kSky)
-    out.object = static_cast<std::uint16_t>(stage_.surfaces_of(hit.part).patches[hit.patch].object);
+    out.object = static_cast<std::uint16_t>(prepared_.surfaces_of(hit.part).patches[hit.patch].object);
 }
 
-// True if the border has each of the two groups on one side of it.
+// True if each of the two groups is on one side of the border.
 bool TileSampler::separates(const Border& border, const PixelRay& ray, const std::array<Hit, 5>& hits,
                             PixelSample& out) const {
   const float level = border.level(ray);
@@ -214,9 +215,9 @@ bool TileSampler::separates(const Border& border, const PixelRay& ray, const std
   return true;
 }
 
-// Finds the line that parts two groups: an edge of a triangle that was hit, the nearer surface's first, or
-// the meeting of two planes.
-bool TileSampler::split(const PixelRay& ray, const std::array<Hit, 5>& hits, PixelSample& out) {
+// Finds the line that separates two groups: an edge of a triangle that was hit, nearest triangle first, or
+// the intersection of two planes.
+bool TileSampler::fit_border(const PixelRay& ray, const std::array<Hit, 5>& hits, PixelSample& out) {
   std::array<const Hit*, 5> by_depth{};
   for (int i = 0; i < 5; ++i) by_depth[i] = &hits[i];
   std::stable_sort(by_depth.begin(), by_depth.end(), [](const Hit* a, const Hit* b) {
@@ -229,13 +230,13 @@ bool TileSampler::split(const PixelRay& ray, const std::array<Hit, 5>& hits, Pix
       return h->part == hit.part && h->triangle == hit.triangle;
     });
     if (seen) continue;
-    const PartSurfaces& surfaces = stage_.surfaces_of(hit.part);
+    const PartSurfaces& surfaces = prepared_.surfaces_of(hit.part);
     for (std::uint8_t edge = 0; edge < 3; ++edge) {
       if (!(surfaces.edges[hit.triangle] >> edge & 1)) continue;
       out.edge = edge;
       out.edge_part = static_cast<std::int8_t>(hit.part);
       out.a = hit.triangle;
-      if (separates(border_of(stage_, *view_, out), ray, hits, out)) return true;
+      if (separates(border_of(prepared_, *view_, out), ray, hits, out)) return true;
     }
   }
   const Hit& one = hits[0];
@@ -244,12 +245,12 @@ bool TileSampler::split(const PixelRay& ray, const std::array<Hit, 5>& hits, Pix
   out.edge = kPlanes;
   out.a = static_cast<std::uint32_t>(one.patch);
   out.b = static_cast<std::uint32_t>(two->patch);
-  return separates(border_of(stage_, *view_, out), ray, hits, out);
+  return separates(border_of(prepared_, *view_, out), ray, hits, out);
 }
 
-// Looks for the borders along scan lines.
-float TileSampler::scan(const PixelRay& ray, const std::array<Hit, 5>& hits) {
-  // Hits are the centre and the corners, row by row. Scan across the borders.
+// Mean luminance of the pixel, with the borders found by bisection along scan lines.
+float TileSampler::scan_lines_luminance(const PixelRay& ray, const std::array<Hit, 5>& hits) {
+  // Scan lines run across the borders.
   const bool across_columns = hits[1].group != hits[2].group || hits[3].group != hits[4].group ||
                               (hits[1].group == hits[3].group && hits[2].group == hits[4].group);
   float sum = 0;
@@ -283,28 +284,28 @@ float TileSampler::scan(const PixelRay& ray, const std::array<Hit, 5>& hits) {
   return sum / kScanLines;
 }
 
-// True if there is a step of depth or direction between two hits. What is stuck to a wall is print.
-bool TileSampler::parted(const Hit& a, const Hit& b, const PixelRay& ray) const {
+// True if depth or normal change between two hits. A step of less than kPrint_m is a print on a wall.
+bool TileSampler::is_geometric_edge(const Hit& a, const Hit& b, const PixelRay& ray) const {
   constexpr double kSameNormal = 0.9998, kPrint_m = 2e-3;
   if (a.group == b.group) return false;
   if (a.group == kSky || b.group == kSky || a.part != b.part) return true;
-  const Patch &p = stage_.surfaces_of(a.part).patches[a.patch],
-              &q = stage_.surfaces_of(b.part).patches[b.patch];
+  const Patch &p = prepared_.surfaces_of(a.part).patches[a.patch],
+              &q = prepared_.surfaces_of(b.part).patches[b.patch];
   if (p.surface == q.surface) return false;
   if (p.normal.dot(q.normal) < kSameNormal) return true;
-  // Distance of b's point from a's plane.
+  // Distance of the point of b from the plane of a.
   const Pose& T_part_cam = a.part < 0 ? view_->T_map_cam : view_->T_part_cam[a.part];
   const Eigen::Vector3d point = T_part_cam * (b.depth * ray.direction(b.at.x(), b.at.y())).cast<double>();
   return std::abs(p.normal.dot(point) + p.offset) > kPrint_m;
 }
 
-void TileSampler::sample_open(int x, int y, PixelSample& out) {
+void TileSampler::sample_mixed(int x, int y, PixelSample& out) {
   const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
   if (at_border_[i]) {
     sample_border(x, y, out);
     return;
   }
-  describe_hit(centres_[i], out);
+  copy_hit(centres_[i], out);
   out.moving = centres_[i].part >= 0;
   out.luminance = shade(centres_[i], ray(plan_->tile.x0 + x, plan_->tile.y0 + y), 0, 0);
 }
@@ -312,26 +313,26 @@ void TileSampler::sample_open(int x, int y, PixelSample& out) {
 void TileSampler::sample_border(int x, int y, PixelSample& out) {
   const PixelRay& r = ray(plan_->tile.x0 + x, plan_->tile.y0 + y);
   find_movers(x, y);
-  const std::array<Hit, 5> hits = around(x, y);
+  const std::array<Hit, 5> hits = centre_and_corners(x, y);
   std::int32_t other = kNone;
   for (int i = 0; i < 5; ++i) {
     out.moving = out.moving || hits[i].part >= 0;
     if (hits[i].group == hits[0].group || hits[i].group == other) continue;
     other = other == kNone ? hits[i].group : kMany;
   }
-  describe_hit(hits[0], out);
+  copy_hit(hits[0], out);
   if (other == kNone) {
     out.luminance = shade(hits[0], r, 0, 0);
     return;
   }
-  for (const Hit& hit : hits) out.outline = out.outline || parted(hits[0], hit, r);
+  for (const Hit& hit : hits) out.outline = out.outline || is_geometric_edge(hits[0], hit, r);
   out.other = other;
-  if (other == kMany || !split(r, hits, out)) {
+  if (other == kMany || !fit_border(r, hits, out)) {
     out.other = kMany;
-    out.luminance = scan(r, hits);
+    out.luminance = scan_lines_luminance(r, hits);
     return;
   }
-  // Each group's own luminance, about the middle of its samples.
+  // Luminance of each group, shaded near the mean of its hits.
   const auto own = [&](std::int32_t group) {
     Eigen::Vector2f middle = Eigen::Vector2f::Zero();
     float count = 0;
@@ -345,14 +346,14 @@ void TileSampler::sample_border(int x, int y, PixelSample& out) {
     middle *= 0.6F / count;
     return shade(*hit, r, middle.x(), middle.y());
   };
-  out.of_group = own(out.group);
-  out.of_other = own(out.other);
-  const float above = border_of(stage_, *view_, out).share_above(r);
-  const float share = out.group_above ? above : 1 - above;
-  out.luminance = share * out.of_group + (1 - share) * out.of_other;
+  out.group_luminance = own(out.group);
+  out.other_luminance = own(out.other);
+  const float above = border_of(prepared_, *view_, out).fraction_above(r);
+  const float fraction = out.group_above ? above : 1 - above;
+  out.luminance = fraction * out.group_luminance + (1 - fraction) * out.other_luminance;
 }
 
-void TileSampler::sample(const View& view, const TilePlan& plan, TileSamples& out) {
+void TileSampler::sample(const SceneView& view, const TilePlan& plan, TileSamples& out) {
   view_ = &view;
   plan_ = &plan;
   patch_views_.clear();
@@ -369,14 +370,14 @@ void TileSampler::sample(const View& view, const TilePlan& plan, TileSamples& ou
       PixelSample& sample = out[i];
       sample = {};
       if (plan.pixel[i] != PixelClass::flat) {
-        sample_open(x, y, sample);  // a smooth pixel is an open one without a border
+        sample_mixed(x, y, sample);  // a smooth pixel is a mixed one without a border
       } else if (plan.patch[i] < 0) {
-        sample.luminance = static_cast<float>(stage_.scene.sky_cd_m2);
+        sample.luminance = static_cast<float>(prepared_.scene.sky_cd_m2);
       } else {
         const PatchView& patch = patch_view(-1, plan.patch[i]);
         sample.group = patch.patch->group;
         sample.object = static_cast<std::uint16_t>(patch.patch->object);
-        sample.luminance = luminance(stage_, view, patch, ray(plan.tile.x0 + x, plan.tile.y0 + y));
+        sample.luminance = luminance(prepared_, view, patch, ray(plan.tile.x0 + x, plan.tile.y0 + y));
       }
     }
   }

@@ -6,7 +6,7 @@
 #include "evpose/sim/light/ray_caster.h"
 #include "evpose/sim/world/mesh_builder.h"
 #include "evpose/sim/world/random.h"
-#include "evpose/sim/world/world_draft.h"
+#include "evpose/sim/world/world_builder.h"
 #include "evpose/sim/world/worlds.h"
 
 namespace evpose::sim {
@@ -20,9 +20,9 @@ Scene layout(WorldKind kind, int seed) {
   WorldConfig config;
   config.kind = kind;
   config.seed = seed;
-  WorldDraft draft(config);
-  EXPECT_TRUE(lay_out_world(draft).ok());
-  return std::move(draft.scene);
+  WorldBuilder builder(config);
+  EXPECT_TRUE(build_world(builder).ok());
+  return std::move(builder.scene);
 }
 
 // No ray that stays within the free space meets anything.
@@ -37,7 +37,7 @@ TEST(WorldsRays, TheFreeSpaceIsFree) {
         V ends[2];
         for (V& end : ends)
           for (int k = 0; k < 3; ++k) end[k] = random.uniform(scene.low[k], scene.high[k]);
-        ASSERT_FALSE(rays.blocked(ends[0], ends[1] - ends[0], 0, 1)) << scene.name << ", seed " << seed;
+        ASSERT_FALSE(rays.occluded(ends[0], ends[1] - ends[0], 0, 1)) << scene.name << ", seed " << seed;
       }
     }
   }
@@ -56,7 +56,7 @@ TEST(WorldsRays, TheConeOverTheLandingPadIsFree) {
                      angle = random.uniform(0, 6.2831);
         end.head<2>() = radius * Eigen::Vector2d(std::cos(angle), std::sin(angle));
       }
-      ASSERT_FALSE(rays.blocked(ends[0], ends[1] - ends[0], 0, 1)) << "seed " << seed;
+      ASSERT_FALSE(rays.occluded(ends[0], ends[1] - ends[0], 0, 1)) << "seed " << seed;
     }
     // The pad: 1.5 m wide, its top at 0.3.
     for (const double x : {-0.74, 0.0, 0.74}) {
@@ -68,7 +68,7 @@ TEST(WorldsRays, TheConeOverTheLandingPadIsFree) {
   }
 }
 
-// Backs of faces are seen nowhere: bodies are closed where one can look.
+// No ray from the free space hits a back face: bodies are closed where they are visible.
 TEST(WorldsRays, OnlyFrontsAreSeen) {
   for (const WorldKind kind : kKinds) {
     const Scene scene = layout(kind, 3);

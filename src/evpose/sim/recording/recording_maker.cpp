@@ -17,7 +17,7 @@
 #include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/sim/flight/flight_check.h"
 #include "evpose/sim/light/scene_contours.h"
-#include "evpose/sim/light/view.h"
+#include "evpose/sim/light/scene_view.h"
 #include "evpose/sim/world/scene_file.h"
 
 namespace evpose::sim {
@@ -46,10 +46,10 @@ Expected<Scene> make_scene(const Scenario& scenario, ThreadPool& pool) {
   return scene;
 }
 
-// The camera's own motion.
+// Motion of the camera on the body.
 CameraPath camera_path(const Trajectory& trajectory, const Pose& T_body_cam) {
   return [&trajectory, T_body_cam](double t_s) {
-    const Motion body = trajectory.at(t_s);
+    const BodyMotion body = trajectory.at(t_s);
     const Eigen::Vector3d velocity_body =
         body.T_map_body.q.conjugate() * body.velocity + body.rate.cross(T_body_cam.p);
     return CameraMotion{body.T_map_body * T_body_cam, T_body_cam.q.conjugate() * velocity_body,
@@ -57,7 +57,7 @@ CameraPath camera_path(const Trajectory& trajectory, const Pose& T_body_cam) {
   };
 }
 
-// Writes events as they are delivered.
+// Writes the delivered events and counts them.
 class EventSink {
  public:
   static Expected<EventSink> create(const NewFolder& folder, ImageSize size, bool truth, const Scene& scene) {
@@ -99,33 +99,34 @@ class EventSink {
   EventPacket packet_;
 };
 
-bool has_contrast(const RayCaster& rays, const Stage& stage, const std::vector<PixelRay>& pixel_rays,
-                  const Pose& pose) {
+bool has_contrast(const RayCaster& rays, const PreparedScene& prepared,
+                  const std::vector<PixelRay>& pixel_rays, const Pose& pose) {
   constexpr std::size_t kEvery = 37;
-  const View view = make_view(stage, 0, pose);
+  const SceneView view = make_scene_view(prepared, 0, pose);
   float low = std::numeric_limits<float>::infinity(), high = 0;
   for (std::size_t i = 0; i < pixel_rays.size(); i += kEvery) {
     const auto hit = rays.trace(pose.p, pose.q * pixel_rays[i].direction().cast<double>());
     const float value =
-        hit ? luminance(stage, view, view_patch(view, stage.patch_of(*hit), -1), pixel_rays[i])
-            : static_cast<float>(stage.scene.sky_cd_m2);
+        hit ? luminance(prepared, view, make_patch_view(view, prepared.patch_of(*hit), -1), pixel_rays[i])
+            : static_cast<float>(prepared.scene.sky_cd_m2);
     low = std::min(low, value);
     high = std::max(high, value);
   }
   return high > 0 && high > 1.01F * low;
 }
 
-class Maker {
+class RecordingMaker {
  public:
-  Maker(const Scenario& scenario, const NewFolder& folder, int threads, std::function<void(double)> progress)
+  RecordingMaker(const Scenario& scenario, const NewFolder& folder, int threads,
+                 std::function<void(double)> progress)
       : scenario_(scenario), folder_(folder), pool_(threads), progress_(std::move(progress)) {}
 
   Expected<RecordingCounts> make();
 
  private:
-  Status write_small_files(const Trajectory& trajectory);
+  Status write_motion_and_calibration(const Trajectory& trajectory);
   Status write_map(const Scene& scene, const RayCaster& rays);
-  Status expose(const Stage& stage, const Camera& camera, const std::vector<PixelRay>& rays,
+  Status expose(const PreparedScene& prepared, const Camera& camera, const std::vector<PixelRay>& rays,
                 const CameraPath& path);
   void report(double fraction) const {
     if (progress_) progress_(fraction);
@@ -138,7 +139,7 @@ class Maker {
   RecordingCounts counts_;
 };
 
-Status Maker::write_small_files(const Trajectory& trajectory) {
+Status RecordingMaker::write_motion_and_calibration(const Trajectory& trajectory) {
   const TimeNs end = from_seconds(counts_.duration_s);
   const Pose body_cam = T_body_cam(scenario_.camera);
   CalibratedCamera camera;
@@ -166,43 +167,43 @@ Status Maker::write_small_files(const Trajectory& trajectory) {
                                                              static_cast<std::uint64_t>(scenario_.seed)));
 }
 
-Status Maker::write_map(const Scene& scene, const RayCaster& rays) {
+Status RecordingMaker::write_map(const Scene& scene, const RayCaster& rays) {
   const ContourMap contours = make_contours(scene, rays, scenario_.truth.contour_spacing_m, pool_);
   counts_.contour_points = contours.points.size();
   if (Status done = write_ply_contours(folder_.path("contours.ply"), contours); !done) return done;
   return write_ply_mesh(folder_.path("mesh.ply"), contours.occluders, contours.anchor);
 }
 
-Status Maker::expose(const Stage& stage, const Camera& camera, const std::vector<PixelRay>& rays,
-                     const CameraPath& path) {
+Status RecordingMaker::expose(const PreparedScene& prepared, const Camera& camera,
+                              const std::vector<PixelRay>& rays, const CameraPath& path) {
   const TimeNs end = from_seconds(counts_.duration_s);
-  auto sink = EventSink::create(folder_, camera.size(), scenario_.truth.events, stage.scene);
+  auto sink = EventSink::create(folder_, camera.size(), scenario_.truth.events, prepared.scene);
   if (!sink) return sink.error();
   auto frames = FrameCamera::create(folder_, camera.size(), scenario_.frames, end);
   if (!frames) return frames.error();
   EventPixels pixels(camera.size(), scenario_.events, static_cast<std::uint64_t>(scenario_.seed));
   ReadOut read_out(camera.size(), scenario_.read_out);
-  Film film(stage, camera, rays, path, scenario_.film, pixels, pool_);
-  film.start(0);
+  PixelIntegrator integrator(prepared, camera, rays, path, scenario_.integrator, pixels, pool_);
+  integrator.start(0);
   std::vector<SimEvent> events, delivered;
   for (TimeNs t = 0; t < end;) {
     events.clear();
     delivered.clear();
-    t = film.advance(end, frames->exposures(t, t + from_seconds(scenario_.film.block_s)), events);
+    t = integrator.advance(end, frames->exposures(t, t + from_seconds(scenario_.integrator.block_s)), events);
     read_out.push(events, t, delivered);
     if (t == end) read_out.finish(delivered);
     if (Status done = sink->write(delivered, counts_); !done) return done;
-    if (Status done = frames->develop(t); !done) return done;
+    if (Status done = frames->write_finished(t); !done) return done;
     report(static_cast<double>(t) / static_cast<double>(end));
   }
   counts_.read_out = read_out.counts();
-  counts_.film = film.counts();
+  counts_.integrator = integrator.counts();
   counts_.frames = frames->written();
   if (Status done = frames->finish(); !done) return done;
   return sink->finish();
 }
 
-Expected<RecordingCounts> Maker::make() {
+Expected<RecordingCounts> RecordingMaker::make() {
   TrajectoryConfig trajectory_config = scenario_.trajectory;
   trajectory_config.duration_s = scenario_.duration_s;
   const auto trajectory = make_trajectory(trajectory_config);
@@ -217,28 +218,28 @@ Expected<RecordingCounts> Maker::make() {
   if (!scene) return scene.error();
 
   const CameraPath path = camera_path(*trajectory, T_body_cam(scenario_.camera));
-  const RayCaster look(*scene);
-  if (Status fine =
-          check_flight(look, path, counts_.duration_s, (*camera)->focal_px(), scenario_.film.fastest_px_s);
+  const RayCaster caster(*scene);
+  if (Status fine = check_flight(caster, path, counts_.duration_s, (*camera)->focal_px(),
+                                 scenario_.integrator.max_flow_px_s);
       !fine)
     return fine.error();
-  const Stage stage(*scene, pool_);
-  if (!has_contrast(look, stage, *rays, path(0).T_map_cam))
+  const PreparedScene prepared(*scene, pool_);
+  if (!has_contrast(caster, prepared, *rays, path(0).T_map_cam))
     return Error{"scenario", "nothing in view has any contrast at the start",
                  "give the world light (world.lamp_lux, world.sun_lux) and texture (world.texture_contrast)"};
 
   const auto T_map_cam = [&](double t_s) { return path(t_s).T_map_cam; };
-  if (Status done = write_small_files(*trajectory); !done) return done.error();
-  if (Status done = write_map(*scene, look); !done) return done.error();
-  if (Status done = write_lidar(folder_.path("map_raw.ply"), look, scenario_.lidar,
+  if (Status done = write_motion_and_calibration(*trajectory); !done) return done.error();
+  if (Status done = write_map(*scene, caster); !done) return done.error();
+  if (Status done = write_lidar(folder_.path("map_raw.ply"), caster, scenario_.lidar,
                                 static_cast<std::uint64_t>(scenario_.seed), pool_);
       !done)
     return done.error();
-  if (Status done = write_depth(folder_, stage, *rays, (*camera)->size(), T_map_cam, scenario_.depth,
+  if (Status done = write_depth(folder_, prepared, *rays, (*camera)->size(), T_map_cam, scenario_.depth,
                                 from_seconds(counts_.duration_s), pool_);
       !done)
     return done.error();
-  if (Status done = expose(stage, **camera, *rays, path); !done) return done.error();
+  if (Status done = expose(prepared, **camera, *rays, path); !done) return done.error();
   return counts_;
 }
 
@@ -248,7 +249,7 @@ Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::st
                                          const std::function<void(double)>& progress) {
   auto temporary = NewFolder::create(folder, kScenarioFile);
   if (!temporary) return temporary.error();
-  auto counts = Maker(scenario, *temporary, threads, progress).make();
+  auto counts = RecordingMaker(scenario, *temporary, threads, progress).make();
   if (!counts) return counts;
   if (Status done = temporary->commit(); !done) return done.error();
   return counts;

@@ -127,7 +127,7 @@ TEST_F(MakeRecording, RefusesWhatCannotBeFlown) {
   scenario_.trajectory.centre_x_m = 5;
   EXPECT_NE(line().find("inside of something"), std::string::npos) << line();
   scenario_ = good;
-  scenario_.film.fastest_px_s = 1;
+  scenario_.integrator.max_flow_px_s = 1;
   EXPECT_NE(line().find("px/s"), std::string::npos) << line();
   scenario_ = good;
   scenario_.frames.exposure_ms = 50;

@@ -8,21 +8,21 @@
 #include "evpose/sim/flight/trajectory.h"
 #include "evpose/sim/sensors/camera_rig.h"
 #include "evpose/sim/sensors/event_pixels.h"
-#include "evpose/sim/sensors/film.h"
 #include "evpose/sim/sensors/frame_camera.h"
 #include "evpose/sim/sensors/imu_sensor.h"
 #include "evpose/sim/sensors/lidar.h"
+#include "evpose/sim/sensors/pixel_integrator.h"
 #include "evpose/sim/sensors/read_out.h"
 #include "evpose/sim/world/worlds.h"
 
 namespace evpose::sim {
 
-/// What all lamps of a world do, and the light from all sides that comes from them.
+/// Switching of all lamps of a world, including their ambient light.
 struct LampConfig {
   double off_at_s = -1, on_at_s = -1;  ///< negative: never
-  double off_factor = 0.02;            ///< what is left when they are off
+  double off_factor = 0.02;            ///< remaining fraction when they are off
   double fade_ms = 2;
-  double flicker_hz = 0;  ///< of the light: twice the mains
+  double flicker_hz = 0;  ///< of the light: twice the mains frequency
   double flicker_depth = 0.12;
 };
 void describe(ConfigTable& table, LampConfig& config);
@@ -34,17 +34,17 @@ struct TruthConfig {
 };
 void describe(ConfigTable& table, TruthConfig& config);
 
-/// All that a recording is made from.
+/// All settings of a recording.
 struct Scenario {
   std::string name = "flight", description;
   int seed = 1;  ///< of the sensors' noise; world and trajectory have their own
   double duration_s = 3;
-  std::string scene_file;  ///< own scene; empty: `world`
+  std::string scene_file;  ///< custom scene; empty: `world`
   WorldConfig world;
   LampConfig lamps;
   TrajectoryConfig trajectory;
   CameraConfig camera;
-  FilmConfig film;
+  PixelIntegratorConfig integrator;
   EventCameraConfig events;
   ReadOutConfig read_out;
   ImuConfig imu;

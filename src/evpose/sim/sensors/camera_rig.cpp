@@ -8,7 +8,7 @@
 namespace evpose::sim {
 
 CameraIntrinsics intrinsics(const CameraConfig& c) {
-  // Not quite square pixels, centre not quite in the middle: as calibrations come out.
+  // Slightly non-square pixels and an off-centre principal point, as in real calibrations.
   constexpr double kSquare = 1.0008, kRight_px = 2.9, kUp_px = 2.6;
   ImageSize size{c.width, c.height};
   double focal_px = c.focal_px;
@@ -31,7 +31,7 @@ CameraIntrinsics intrinsics(const CameraConfig& c) {
 
 Pose T_body_cam(const CameraConfig& c) {
   constexpr double kDegree = std::numbers::pi / 180;
-  Eigen::Matrix3d R_forward_cam;  // z ahead, x to the right
+  Eigen::Matrix3d R_forward_cam;  // z forward, x right
   R_forward_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Eigen::Quaterniond turn = so3::exp(c.yaw_left_deg * kDegree * Eigen::Vector3d::UnitZ()) *
                                   so3::exp(c.pitch_down_deg * kDegree * Eigen::Vector3d::UnitY()) *

@@ -18,7 +18,7 @@ enum class SensorSize : std::uint8_t {
   custom,  ///< as width, height and focal length say
 };
 
-/// The event camera's optics, and its place on the body.
+/// Optics and mounting of the event camera.
 struct CameraConfig {
   SensorSize size = SensorSize::vga;
   int width = 640, height = 480;  ///< of a custom sensor

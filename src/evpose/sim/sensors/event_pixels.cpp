@@ -12,21 +12,21 @@
 namespace evpose::sim {
 namespace {
 
-// A threshold of a few per cent would fire on rounding.
+// Smaller thresholds would trigger on rounding errors.
 constexpr double kLeastThreshold = 0.02;
-// How far ahead the bounds of the quick look hold; the leak moves them by a per cent of a threshold
-// meanwhile.
+// Validity of the bounds of advance_without_event(); the leak moves them by one per cent of a threshold in
+// it.
 constexpr TimeNs kHorizon = 100 * kNsPerMs;
-// Slack of the quick look for the rounding of its floats, in log luminance.
+// Margin of these bounds for float rounding, in log luminance.
 constexpr double kSlack = 2e-6;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
-// Which random numbers of a pixel are used for what.
+// Random stream that selects hot pixels.
 constexpr std::uint64_t kHotStream = 1ULL << 40;
 
 double seconds(TimeNs t) { return 1e-9 * static_cast<double>(t); }
 
-/// Where a monotonic function reaches `level` in [low, high], nanoseconds. Newton, or halving where that
+/// Where a monotonic function reaches `level` in [low, high], nanoseconds. Newton, or bisection where that
 /// leaves the bracket.
 template <class Function>
 double root(const Function& function, double level, double low, double high) {
@@ -55,43 +55,41 @@ struct Crossing {
 }  // namespace
 
 void describe(ConfigTable& table, EventCameraConfig& c) {
-  table.add("threshold_on", c.threshold_on, "", "rise of log luminance that makes an event",
+  table.add("threshold_on", c.threshold_on, "", "contrast threshold of on events, in log luminance",
             {kLeastThreshold, 10});
-  table.add("threshold_off", c.threshold_off, "", "fall of log luminance that makes an event",
+  table.add("threshold_off", c.threshold_off, "", "contrast threshold of off events, in log luminance",
             {kLeastThreshold, 10});
-  table.add("threshold_sigma", c.threshold_sigma, "", "spread of both over the pixels, 1 sigma", {0, 1});
-  table.add("refractory_us", c.refractory_us, "us", "a pixel is held in reset after an event", {0, 1e6});
+  table.add("threshold_sigma", c.threshold_sigma, "", "mismatch of both between pixels, 1 sigma", {0, 1});
+  table.add("refractory_us", c.refractory_us, "us", "refractory period", {0, 1e6});
   table.add("dark_cd_m2", c.dark_cd_m2, "cd/m^2", "dark current, as luminance added to every pixel",
             {1e-4, 1e3});
   table.add("bandwidth_hz_per_cd_m2", c.bandwidth_hz_per_cd_m2, "Hz m^2/cd",
-            "corner of a pixel's low pass, by its luminance; 0: no low pass", {0, 1e6});
-  table.add("bandwidth_max_hz", c.bandwidth_max_hz, "Hz", "corner of a pixel's low pass in bright light",
-            {1, 1e6});
-  table.add("leak_hz", c.leak_hz, "1/s", "on events per pixel by leaking references", {0, 100});
-  table.add("shot_noise_dark_hz", c.shot_noise_dark_hz, "1/s", "noise events per pixel in darkness",
+            "bandwidth of a pixel by its luminance; 0: unlimited", {0, 1e6});
+  table.add("bandwidth_max_hz", c.bandwidth_max_hz, "Hz", "bandwidth of a pixel in bright light", {1, 1e6});
+  table.add("leak_hz", c.leak_hz, "1/s", "leak events per pixel", {0, 100});
+  table.add("shot_noise_dark_hz", c.shot_noise_dark_hz, "1/s", "shot noise events per pixel in darkness",
             {0, 1e4});
-  table.add("shot_noise_bright_hz", c.shot_noise_bright_hz, "1/s", "noise events per pixel in bright light",
-            {0, 1e4});
+  table.add("shot_noise_bright_hz", c.shot_noise_bright_hz, "1/s",
+            "shot noise events per pixel in bright light", {0, 1e4});
   table.add("shot_noise_half_cd_m2", c.shot_noise_half_cd_m2, "cd/m^2",
             "luminance where the noise is half-way between dark and bright", {1e-4, 1e6});
-  table.add("hot_share", c.hot_share, "", "share of pixels that fire without cause", {0, 1});
-  table.add("hot_min_hz", c.hot_min_hz, "1/s", "rate of the calmest hot pixel", {1e-3, 1e5});
-  table.add("hot_max_hz", c.hot_max_hz, "1/s", "rate of the worst hot pixel", {1e-3, 1e5});
-  table.add("start_spread", c.start_spread, "",
-            "share of the threshold by which first references are off the signal", {0, 1});
+  table.add("hot_pixel_fraction", c.hot_pixel_fraction, "", "fraction of hot pixels", {0, 1});
+  table.add("hot_min_hz", c.hot_min_hz, "1/s", "lowest rate of a hot pixel", {1e-3, 1e5});
+  table.add("hot_max_hz", c.hot_max_hz, "1/s", "highest rate of a hot pixel", {1e-3, 1e5});
+  table.add("reference_spread", c.reference_spread, "",
+            "initial offset of the reference from the signal, as a fraction of the threshold", {0, 1});
 }
 
-/// Log luminance that rises or falls linearly in luminance, plus leak, over s nanoseconds from a span's
-/// start.
-class EventPixels::Ramp {
+/// Log of a luminance that is linear in time, plus leak, s nanoseconds after the start of a span.
+class EventPixels::LinearLuminance {
  public:
-  Ramp(double from, double to, double length_ns, double offset, double leak_per_ns)
+  LinearLuminance(double from, double to, double length_ns, double offset, double leak_per_ns)
       : from_(from), gain_((to - from) / length_ns), offset_(offset), leak_(leak_per_ns) {}
   double level(double s) const { return from_ + gain_ * s; }
   double log_luminance(double s) const { return std::log(level(s)); }
   double value(double s) const { return log_luminance(s) + offset_ + leak_ * s; }
   double slope(double s) const { return gain_ / level(s) + leak_; }
-  /// Where the slope is zero; NaN if nowhere.
+  /// Where the slope is zero; NaN if there is no such point.
   double turn() const {
     return leak_ > 0 && gain_ < 0 ? (-gain_ / leak_ - from_) / gain_
                                   : std::numeric_limits<double>::quiet_NaN();
@@ -101,8 +99,8 @@ class EventPixels::Ramp {
   double from_, gain_, offset_, leak_;
 };
 
-/// What a low pass makes of log luminance that changes linearly, plus leak.
-class EventPixels::Response {
+/// Response of a first-order low pass to a linear log luminance, plus leak.
+class EventPixels::LowPassResponse {
  public:
   struct Input {
     double from, to;  ///< log luminance
@@ -110,7 +108,7 @@ class EventPixels::Response {
     double filtered;  ///< at the start
     double length_ns, tau_ns;
   };
-  Response(const Input& in, double offset, double leak_per_ns)
+  LowPassResponse(const Input& in, double offset, double leak_per_ns)
       : level_(in.level),
         gain_((in.to - in.from) / in.length_ns),
         tau_(in.tau_ns),
@@ -131,7 +129,7 @@ class EventPixels::Response {
 namespace {
 
 /// First time in (low, high] at which the signal reaches `on` or `off`, in ns from the span's start. The
-/// signal's curvature has one sign, so it turns once at most.
+/// curvature of the signal has one sign, hence one extremum at most.
 template <class Signal>
 std::optional<std::pair<double, bool>> first_crossing(const Signal& signal, double low, double high,
                                                       double on, double off) {
@@ -153,13 +151,13 @@ EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::u
     : size_(size),
       config_(config),
       seed_(seed),
-      limited_(config.bandwidth_hz_per_cd_m2 > 0),
+      band_limited_(config.bandwidth_hz_per_cd_m2 > 0),
       dark_(static_cast<float>(config.dark_cd_m2)),
       leak_per_s_(config.leak_hz * config.threshold_on),
       refractory_ns_(from_seconds(1e-6 * config.refractory_us)),
       pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)) {
   EVPOSE_CHECK(config.dark_cd_m2 > 0 && config.threshold_on > 0 && config.threshold_off > 0);
-  if (limited_) {
+  if (band_limited_) {
     tau_fast_s_ = 0.5 / (std::numbers::pi * config.bandwidth_max_hz);
     tau_dim_s_ = 0.5 / (std::numbers::pi * config.bandwidth_hz_per_cd_m2);
   }
@@ -180,10 +178,10 @@ void EventPixels::start(std::size_t pixel, TimeNs t, float luminance_cd_m2) {
   p.filtered = std::log(level);
   p.log_last = static_cast<float>(p.filtered);
   draw_next_noise(pixel, t);
-  // Anywhere between "about to fire off" and "about to fire on".
-  const double share = config_.start_spread * p.random.uniform(-1, 1);
+  // Uniform between the two thresholds.
+  const double fraction = config_.reference_spread * p.random.uniform(-1, 1);
   set_reference(p, p.filtered, t);
-  const double offset = share * (share < 0 ? p.on : p.off);
+  const double offset = fraction * (fraction < 0 ? p.on : p.off);
   p.reference += offset;
   p.log_leak += static_cast<float>(0.5 * offset);
   set_bounds(p, t);
@@ -191,7 +189,7 @@ void EventPixels::start(std::size_t pixel, TimeNs t, float luminance_cd_m2) {
 
 double EventPixels::hot_rate_hz(std::size_t pixel) const {
   Random random(seed_, kHotStream + pixel);
-  if (random.uniform() >= config_.hot_share) return 0;
+  if (random.uniform() >= config_.hot_pixel_fraction) return 0;
   return config_.hot_min_hz * std::pow(config_.hot_max_hz / config_.hot_min_hz, random.uniform());
 }
 
@@ -199,7 +197,7 @@ void EventPixels::draw_next_noise(std::size_t pixel, TimeNs t) {
   Pixel& p = pixels_[pixel];
   const double rate_hz =
       std::max(config_.shot_noise_dark_hz, config_.shot_noise_bright_hz) + hot_rate_hz(pixel);
-  // Further off than any recording is long: never.
+  // Beyond the length of any recording.
   constexpr double kLongest_s = 1e9;
   const double wait_s = rate_hz > 0 ? p.random.exponential() / rate_hz : kLongest_s;
   p.next_noise = wait_s < kLongest_s ? t + 1 + static_cast<TimeNs>(1e9 * wait_s) : kNever;
@@ -225,7 +223,7 @@ void EventPixels::set_bounds(Pixel& p, TimeNs t) const {
   p.wake = std::min(p.next_noise, t + kHorizon);
   double high = p.reference + p.on - leak_per_s_ * seconds(p.wake) - kSlack;
   double low = p.reference - p.off - leak_per_s_ * seconds(t) + kSlack;
-  if (!limited_) high = std::exp(high), low = std::exp(low);
+  if (!band_limited_) high = std::exp(high), low = std::exp(low);
   p.high = static_cast<float>(high);
   p.low = static_cast<float>(low);
 }
@@ -243,19 +241,19 @@ void EventPixels::fire(std::size_t pixel, TimeNs t, bool on, EventCause cause,
 }
 
 template <class Signal>
-void EventPixels::walk(std::size_t pixel, TimeNs t0, TimeNs t1, const Signal& signal,
-                       std::vector<SimEvent>& events) {
+void EventPixels::emit_events(std::size_t pixel, TimeNs t0, TimeNs t1, const Signal& signal,
+                              std::vector<SimEvent>& events) {
   Pixel& p = pixels_[pixel];
   const auto since = [&](TimeNs t) { return static_cast<double>(t - t0); };
   TimeNs now = t0;
   while (true) {
-    if (p.high == kInfinity) {  // in reset: the reference follows the signal until its end
+    if (p.high == kInfinity) {  // in reset: the reference follows the signal
       if (p.wake > t1) return;
       now = std::max(now, p.wake);
       set_reference(p, signal.log_luminance(since(now)), now);
       p.high = p.low = 0;
     }
-    while (p.next_noise < now) draw_next_noise(pixel, p.next_noise);  // what fell into a reset is lost
+    while (p.next_noise < now) draw_next_noise(pixel, p.next_noise);  // noise during a reset is lost
     const auto crossing =
         first_crossing(signal, since(now), since(t1), p.reference + p.on, p.reference - p.off);
     const TimeNs t_crossing =
@@ -286,14 +284,14 @@ void EventPixels::walk(std::size_t pixel, TimeNs t0, TimeNs t1, const Signal& si
   set_bounds(p, t1);
 }
 
-void EventPixels::advance_unlimited(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
+void EventPixels::advance_unfiltered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
   const double from = std::max(0.0, span.from) + dark_, to = std::max(0.0, span.to) + dark_;
-  const Ramp ramp(from, to, static_cast<double>(span.t1 - span.t0), leak_per_s_ * seconds(span.t0),
-                  1e-9 * leak_per_s_);
-  walk(pixel, span.t0, span.t1, ramp, events);
+  const LinearLuminance ramp(from, to, static_cast<double>(span.t1 - span.t0), leak_per_s_ * seconds(span.t0),
+                             1e-9 * leak_per_s_);
+  emit_events(pixel, span.t0, span.t1, ramp, events);
 }
 
-void EventPixels::advance_limited(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
+void EventPixels::advance_filtered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
   Pixel& p = pixels_[pixel];
   const double from = std::max(0.0, span.from) + dark_, to = std::max(0.0, span.to) + dark_;
   const double change = std::log(to / from);
@@ -308,10 +306,10 @@ void EventPixels::advance_limited(std::size_t pixel, const Span& span, std::vect
     if (t_next > t) {
       const double mean = 0.5 * (level + next), length_ns = static_cast<double>(t_next - t);
       const double log_next = std::log(next);
-      const Response response(
+      const LowPassResponse response(
           {p.log_last, log_next, mean, p.filtered, length_ns, 1e9 * time_constant_s(mean)},
           leak_per_s_ * seconds(t), 1e-9 * leak_per_s_);
-      walk(pixel, t, t_next, response, events);
+      emit_events(pixel, t, t_next, response, events);
       p.filtered = response.log_luminance(length_ns);
       p.log_last = static_cast<float>(log_next);
     }

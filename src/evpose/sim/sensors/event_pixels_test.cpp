@@ -19,7 +19,7 @@ EventCameraConfig faultless() {
   EventCameraConfig c;
   c.threshold_on = c.threshold_off = 0.24;
   c.threshold_sigma = c.refractory_us = c.bandwidth_hz_per_cd_m2 = c.leak_hz = 0;
-  c.shot_noise_dark_hz = c.shot_noise_bright_hz = c.hot_share = c.start_spread = 0;
+  c.shot_noise_dark_hz = c.shot_noise_bright_hz = c.hot_pixel_fraction = c.reference_spread = 0;
   c.dark_cd_m2 = 1e-4;
   return c;
 }
@@ -72,7 +72,7 @@ TEST(EventPixels, MovingStepEdgeGivesLogContrastOverThresholdEventsAtTheRightTim
   }
 }
 
-TEST(EventPixels, DarkCurrentTakesItsShareOfTheContrast) {
+TEST(EventPixels, DarkCurrentReducesTheContrast) {
   EventCameraConfig config = faultless();
   config.dark_cd_m2 = 5;
   EventPixels pixels({1, 1}, config, 1);
@@ -98,30 +98,30 @@ TEST(EventPixels, ResetHoldsThePixelForTheRefractoryTime) {
     }
     ASSERT_EQ(events.size(), expected_s.size());
     EXPECT_LT(events.size(), 7u);
-    // 30 us is no divisor of 1 ms: there the course bends up to 30 us late.
+    // 30 us is no divisor of 1 ms: there the curve bends up to 30 us late.
     const double tolerance_s = step == kNsPerMs ? 0.2e-6 : 3e-6;
     for (std::size_t i = 0; i < events.size(); ++i)
       EXPECT_NEAR(to_seconds(events[i].t), expected_s[i], tolerance_s);
   }
 }
 
-// Log luminance of a pixel behind its low pass, told by events of a small threshold.
-struct LogCourse {
+// Log luminance of a pixel after its low pass, measured by events of a small threshold.
+struct LogCurve {
   std::vector<double> t_s, log;
 };
-LogCourse behind_low_pass(const EventCameraConfig& base, double start, const std::vector<TimeNs>& grid,
-                          const Light& light) {
+LogCurve behind_low_pass(const EventCameraConfig& base, double start, const std::vector<TimeNs>& grid,
+                         const Light& light) {
   EventCameraConfig config = base;
   config.threshold_on = config.threshold_off = 0.02;
   EventPixels pixels({1, 1}, config, 1);
-  LogCourse course;
+  LogCurve curve;
   double log = start;
   for (const SimEvent& e : watch(pixels, 0, grid, light)) {
     log += e.on ? 0.02F : -0.02F;
-    course.t_s.push_back(to_seconds(e.t));
-    course.log.push_back(log);
+    curve.t_s.push_back(to_seconds(e.t));
+    curve.log.push_back(log);
   }
-  return course;
+  return curve;
 }
 
 TEST(EventPixels, LowPassAnswersASmallStepWithItsTimeConstant) {
@@ -135,12 +135,12 @@ TEST(EventPixels, LowPassAnswersASmallStepWithItsTimeConstant) {
     for (const TimeNs step : {kNsPerS, 100 * kNsPerUs}) {
       std::vector<TimeNs> grid = {0, 1};
       for (TimeNs t = step; t <= kNsPerS; t += step) grid.push_back(t);
-      const auto course =
+      const auto curve =
           behind_low_pass(config, std::log(level), grid, [&](double t) { return t > 0 ? high : level; });
-      ASSERT_EQ(course.t_s.size(), 4u);
-      for (std::size_t i = 0; i < course.t_s.size(); ++i) {
-        const double expected = 0.09 * (1 - std::exp(-course.t_s[i] / tau_s));
-        EXPECT_NEAR(course.log[i] - std::log(level), expected, 2e-5) << level << " " << step;
+      ASSERT_EQ(curve.t_s.size(), 4u);
+      for (std::size_t i = 0; i < curve.t_s.size(); ++i) {
+        const double expected = 0.09 * (1 - std::exp(-curve.t_s[i] / tau_s));
+        EXPECT_NEAR(curve.log[i] - std::log(level), expected, 2e-5) << level << " " << step;
       }
     }
   }
@@ -152,13 +152,13 @@ TEST(EventPixels, LowPassLagsBehindARampByItsTimeConstant) {
   config.bandwidth_max_hz = 50;
   const double tau_s = 1 / (2 * std::numbers::pi * 50);
   for (const double rate : {3.0, -3.0}) {  // of log luminance, 1/s
-    const auto course = behind_low_pass(config, std::log(20.0), even_grid(200 * kNsPerUs, kNsPerS),
-                                        [&](double t) { return 20 * std::exp(rate * t); });
-    ASSERT_GT(course.t_s.size(), 140u);
-    for (std::size_t i = 0; i < course.t_s.size(); ++i) {
-      const double t = course.t_s[i];
+    const auto curve = behind_low_pass(config, std::log(20.0), even_grid(200 * kNsPerUs, kNsPerS),
+                                       [&](double t) { return 20 * std::exp(rate * t); });
+    ASSERT_GT(curve.t_s.size(), 140u);
+    for (std::size_t i = 0; i < curve.t_s.size(); ++i) {
+      const double t = curve.t_s[i];
       const double expected = rate * (t - tau_s * (1 - std::exp(-t / tau_s)));
-      EXPECT_NEAR(course.log[i] - std::log(20.0), expected, 1e-4);
+      EXPECT_NEAR(curve.log[i] - std::log(20.0), expected, 1e-4);
     }
   }
 }
@@ -258,7 +258,7 @@ TEST(EventPixels, ThresholdsSpreadAsConfiguredOnAndOffApart) {
 
 TEST(EventPixels, FirstReferencesLieAnywhereBetweenTheThresholds) {
   EventCameraConfig config = faultless();
-  config.start_spread = 1;
+  config.reference_spread = 1;
   constexpr int kCount = 4000;
   EventPixels pixels({kCount, 1}, config, 3);
   double sum = 0, squares = 0;
@@ -267,7 +267,7 @@ TEST(EventPixels, FirstReferencesLieAnywhereBetweenTheThresholds) {
         watch(pixels, i, even_grid(kNsPerMs, 60 * kNsPerMs), [](double t) { return 20 * std::exp(10 * t); });
     ASSERT_FALSE(events.empty());
     for (const SimEvent& e : events) EXPECT_EQ(e.cause, EventCause::signal);
-    const double left = 10 * to_seconds(events[0].t);  // of the way to the first event: even in 0 .. 0.48
+    const double left = 10 * to_seconds(events[0].t);  // up to the first event: uniform in 0 .. 0.48
     sum += left;
     squares += left * left;
   }
@@ -321,7 +321,7 @@ TEST(EventPixels, LeakMakesOnEventsAtItsRate) {
     EventCameraConfig config = faultless();
     config.bandwidth_hz_per_cd_m2 = bandwidth;
     config.leak_hz = 2;
-    config.start_spread = 1;
+    config.reference_spread = 1;
     config.refractory_us = 100;
     const Counts counts = count_still(config, 30, 32, 4 * kNsPerS);
     // A start between the thresholds delays or hastens the first event by up to half a second.
@@ -333,7 +333,7 @@ TEST(EventPixels, LeakMakesOnEventsAtItsRate) {
 
 TEST(EventPixels, HotPixelsFireWithinTheirRange) {
   EventCameraConfig config = faultless();
-  config.hot_share = 0.02;
+  config.hot_pixel_fraction = 0.02;
   constexpr int kCount = 4096;
   EventPixels pixels({kCount, 1}, config, 1);
   const auto grid = even_grid(5 * kNsPerMs, 4 * kNsPerS);

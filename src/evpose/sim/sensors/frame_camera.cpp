@@ -32,7 +32,7 @@ Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, ImageSize siz
   if (config.rate_hz > 0) {
     if (config.exposure_ms * 1e-3 * config.rate_hz > 1)
       return Error{"frames.exposure_ms",
-                   text(config.exposure_ms, " ms do not fit between pictures at ", config.rate_hz, " Hz"),
+                   text(config.exposure_ms, " ms do not fit between frames at ", config.rate_hz, " Hz"),
                    "shorten the exposure or lower frames.rate_hz"};
     if (Status made = folder.make_folder("frames"); !made) return made.error();
   }
@@ -42,12 +42,12 @@ Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, ImageSize siz
 std::vector<Exposure*> FrameCamera::exposures(TimeNs t0, TimeNs t1) {
   if (config_.rate_hz > 0) {
     while (true) {
-      const TimeNs open = from_seconds(begun_ / config_.rate_hz),
+      const TimeNs open = from_seconds(started_ / config_.rate_hz),
                    close = open + from_seconds(1e-3 * config_.exposure_ms);
       if (open > t1 || close > end_) break;
       open_.push_back(
           {open, close, std::vector<float>(static_cast<std::size_t>(size_.width) * size_.height)});
-      ++begun_;
+      ++started_;
     }
   }
   std::vector<Exposure*> out;
@@ -57,7 +57,7 @@ std::vector<Exposure*> FrameCamera::exposures(TimeNs t0, TimeNs t1) {
   return out;
 }
 
-Status FrameCamera::develop(TimeNs t) {
+Status FrameCamera::write_finished(TimeNs t) {
   while (!open_.empty() && open_.front().close <= t) {
     const Exposure& exposure = open_.front();
     const double length_s = to_seconds(exposure.close - exposure.open);
@@ -88,7 +88,7 @@ Status FrameCamera::finish() {
                          "#timestamp_ns,filename,exposure_ns\n" + stamps_);
 }
 
-Status write_depth(const NewFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
+Status write_depth(const NewFolder& folder, const PreparedScene& prepared, const std::vector<PixelRay>& rays,
                    ImageSize size, const std::function<Pose(double t_s)>& T_map_cam,
                    const DepthConfig& config, TimeNs end, ThreadPool& pool) {
   if (!(config.rate_hz > 0)) return {};
@@ -98,10 +98,10 @@ Status write_depth(const NewFolder& folder, const Stage& stage, const std::vecto
   for (int k = 0; from_seconds(k / config.rate_hz) <= end; ++k) {
     const TimeNs t = from_seconds(k / config.rate_hz);
     const Pose pose = T_map_cam(to_seconds(t));
-    const std::vector<Pose> parts = stage.rays.parts_at(to_seconds(t));
+    const std::vector<Pose> parts = prepared.rays.parts_at(to_seconds(t));
     pool.for_chunks(rays.size(), 4096, [&](std::size_t, std::size_t begin, std::size_t stop) {
       for (std::size_t i = begin; i < stop; ++i) {
-        const auto hit = stage.rays.trace(parts, pose.p, pose.q * rays[i].direction().cast<double>());
+        const auto hit = prepared.rays.trace(parts, pose.p, pose.q * rays[i].direction().cast<double>());
         const double mm = hit ? 1e3 * hit->distance : 0;  // rays have z = 1
         depth_mm[i] = mm < 65535 ? static_cast<std::uint16_t>(std::lround(mm)) : std::uint16_t{0};
       }
@@ -116,15 +116,15 @@ Status write_depth(const NewFolder& folder, const Stage& stage, const std::vecto
 }
 
 void describe(ConfigTable& table, FramesConfig& c) {
-  table.add("rate_hz", c.rate_hz, "Hz", "grey pictures; 0: none", {0, 1000});
-  table.add("exposure_ms", c.exposure_ms, "ms", "mean of the luminance over so long", {0.01, 1000});
+  table.add("rate_hz", c.rate_hz, "Hz", "rate of grey-level frames; 0: none", {0, 1000});
+  table.add("exposure_ms", c.exposure_ms, "ms", "exposure time", {0.01, 1000});
   table.add("white_cd_m2", c.white_cd_m2, "cd/m^2",
-            "shown as white; 0: six times the median of the first picture", {0, 1e9});
-  table.add("range_db", c.range_db, "dB", "what is darker than white by so much is black", {10, 140});
+            "luminance of white; 0: six times the median of the first frame", {0, 1e9});
+  table.add("range_db", c.range_db, "dB", "dynamic range between black and white", {10, 140});
 }
 
 void describe(ConfigTable& table, DepthConfig& c) {
-  table.add("rate_hz", c.rate_hz, "Hz", "depth pictures; 0: none", {0, 1000});
+  table.add("rate_hz", c.rate_hz, "Hz", "rate of depth images; 0: none", {0, 1000});
 }
 
 }  // namespace evpose::sim

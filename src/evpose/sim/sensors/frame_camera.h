@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evpose/core/error.h"
-#include "evpose/sim/sensors/film.h"
+#include "evpose/sim/sensors/pixel_integrator.h"
 
 namespace evpose {
 class NewFolder;
@@ -14,19 +14,19 @@ class NewFolder;
 
 namespace evpose::sim {
 
-/// Grey pictures beside the events, through the same lens.
+/// Grey-level frames beside the events, through the same lens.
 struct FramesConfig {
   double rate_hz = 0;      ///< 0: none
-  double exposure_ms = 8;  ///< mean of the luminance over so long
-  double white_cd_m2 = 0;  ///< shown as white; 0: six times the median of the first picture
-  double range_db = 60;    ///< what is darker than white by so much is black
+  double exposure_ms = 8;  ///< luminance is averaged over it
+  double white_cd_m2 = 0;  ///< luminance of white; 0: six times the median of the first frame
+  double range_db = 60;    ///< dynamic range between black and white
 };
 void describe(ConfigTable& table, FramesConfig& config);
 
-/// Grey value of a mean luminance: a power law between black and white.
+/// Grey value of a mean luminance: gamma curve between black and white.
 std::uint8_t grey_value(double luminance, double white, double range_db);
 
-/// Writes frames/NNNNNN.png and frames/timestamps.csv. A picture's time is the middle of its exposure.
+/// Writes frames/NNNNNN.png and frames/timestamps.csv. The time of a frame is the middle of its exposure.
 class FrameCamera {
  public:
   /// Keeps a reference to the folder.
@@ -35,8 +35,8 @@ class FrameCamera {
 
   /// Exposures that are open at some time in [t0, t1].
   std::vector<Exposure*> exposures(TimeNs t0, TimeNs t1);
-  /// Everything up to `t` is exposed: writes the pictures that are complete.
-  Status develop(TimeNs t);
+  /// Writes the frames that are completely exposed at time `t`.
+  Status write_finished(TimeNs t);
   Status finish();
   int written() const { return written_; }
 
@@ -49,20 +49,20 @@ class FrameCamera {
   FramesConfig config_;
   double white_;
   TimeNs end_;
-  int begun_ = 0, written_ = 0;
+  int started_ = 0, written_ = 0;
   std::list<Exposure> open_;
   std::string stamps_;
 };
 
-/// Depth pictures: z of the pixels' centres, moving things included.
+/// Depth images: z at the centre of each pixel, moving objects included.
 struct DepthConfig {
   double rate_hz = 0;  ///< 0: none
 };
 void describe(ConfigTable& table, DepthConfig& config);
 
-/// Writes depth/NNNNNN.png, 16 bits, millimetres, 0 beyond 65.5 m and where there is nothing, and
+/// Writes depth/NNNNNN.png, 16 bits, millimetres, 0 beyond 65.5 m and where there is no surface, and
 /// depth/timestamps.csv.
-Status write_depth(const NewFolder& folder, const Stage& stage, const std::vector<PixelRay>& rays,
+Status write_depth(const NewFolder& folder, const PreparedScene& prepared, const std::vector<PixelRay>& rays,
                    ImageSize size, const std::function<Pose(double t_s)>& T_map_cam,
                    const DepthConfig& config, TimeNs end, ThreadPool& pool);
 

@@ -50,7 +50,7 @@ TEST(ImuSensor, AllanDeviationAtRestIsThatOfTheDensities) {
     ImuConfig white;
     white.preset = preset;
     white.rate_hz = rate_hz;
-    white.accel_step_m_s2 = white.gyro_step_deg_s = 0;
+    white.accel_resolution_m_s2 = white.gyro_resolution_deg_s = 0;
     const ImuNoise noise = imu_noise(white);
     ImuConfig walk = white;
     white.accel_walk = white.gyro_walk = 0;
@@ -76,7 +76,7 @@ TEST(ImuSensor, IdealReadsTheTruth) {
   ASSERT_EQ(samples.size(), 2001u);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     ASSERT_EQ(samples[i].t, static_cast<TimeNs>(i) * kNsPerMs);
-    const Motion m = trajectory.at(1e-3 * static_cast<double>(i));
+    const BodyMotion m = trajectory.at(1e-3 * static_cast<double>(i));
     EXPECT_LT((samples[i].gyro - m.rate).norm(), 1e-12);
     EXPECT_LT((m.T_map_body.q * samples[i].accel + gravity_map() - m.acceleration).norm(), 1e-9);
   }
@@ -85,7 +85,7 @@ TEST(ImuSensor, IdealReadsTheTruth) {
 TEST(ImuSensor, StrapdownOfTheIdealImuFollowsASpiral) {
   const Trajectory trajectory = flight(TrajectoryKind::square_spiral);
   const auto samples = simulate_imu(trajectory, 10 * kNsPerS, ideal(1000), 3);
-  const Motion start = trajectory.at(0), end = trajectory.at(10);
+  const BodyMotion start = trajectory.at(0), end = trajectory.at(10);
   NavState state{start.T_map_body, start.velocity};
   for (std::size_t i = 1; i < samples.size(); ++i)
     state = strapdown(state, samples[i - 1], samples[i], Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
@@ -99,23 +99,23 @@ TEST(ImuSensor, ReadingsAreMatrixTimesTruthPlusBias) {
   ImuConfig c = ideal(200);
   c.accel_scale = 0.02, c.gyro_scale = 0.03, c.accel_misalignment_deg = 1, c.gyro_misalignment_deg = 2;
   c.accel_bias = 0.1, c.gyro_bias = 0.01;
-  const ImuFaults faults = draw_faults(c, 7);
-  EXPECT_GT((faults.gyro_matrix - Eigen::Matrix3d::Identity()).norm(), 0.02);
-  EXPECT_GT(faults.accel_bias.norm(), 0.01);
+  const ImuErrors errors = draw_imu_errors(c, 7);
+  EXPECT_GT((errors.gyro_matrix - Eigen::Matrix3d::Identity()).norm(), 0.02);
+  EXPECT_GT(errors.accel_bias.norm(), 0.01);
   for (const ImuSample& s : simulate_imu(trajectory, kNsPerS, c, 7)) {
     const ImuSample truth = ideal_imu(trajectory.at(to_seconds(s.t)), s.t);
-    EXPECT_LT((s.gyro - faults.gyro_matrix * truth.gyro - faults.gyro_bias).norm(), 1e-10);
-    EXPECT_LT((s.accel - faults.accel_matrix * truth.accel - faults.accel_bias).norm(), 1e-10);
+    EXPECT_LT((s.gyro - errors.gyro_matrix * truth.gyro - errors.gyro_bias).norm(), 1e-10);
+    EXPECT_LT((s.accel - errors.accel_matrix * truth.accel - errors.accel_bias).norm(), 1e-10);
   }
 }
 
-TEST(ImuSensor, FaultsSpreadAsConfigured) {
+TEST(ImuSensor, ErrorsSpreadAsConfigured) {
   ImuConfig c = ideal(200);
   c.gyro_scale = 0.03, c.gyro_misalignment_deg = 2, c.gyro_bias = 0.01;
   double scale = 0, misalignment = 0, bias = 0;
   constexpr int kCount = 2000;
   for (std::uint64_t seed = 0; seed < kCount; ++seed) {
-    const ImuFaults f = draw_faults(c, seed);
+    const ImuErrors f = draw_imu_errors(c, seed);
     EXPECT_EQ(f.accel_matrix, Eigen::Matrix3d::Identity());
     const Eigen::Matrix3d off = f.gyro_matrix - Eigen::Matrix3d::Identity();
     scale += off.diagonal().squaredNorm() / (3 * kCount);
@@ -146,7 +146,8 @@ TEST(ImuSensor, ReadingsSaturateAtTheRange) {
 
 TEST(ImuSensor, ReadingsAreWholeSteps) {
   ImuConfig c = ideal(100);
-  c.gyro_density = 1e-3, c.gyro_step_deg_s = 0.5, c.accel_density = 0.01, c.accel_step_m_s2 = 0.25;
+  c.gyro_density = 1e-3, c.gyro_resolution_deg_s = 0.5, c.accel_density = 0.01,
+  c.accel_resolution_m_s2 = 0.25;
   for (const ImuSample& s : simulate_imu(rest(), kNsPerS, c, 1))
     for (int axis = 0; axis < 3; ++axis) {
       const double gyro = s.gyro[axis] / (0.5 * kDegree), accel = s.accel[axis] / 0.25;
@@ -210,7 +211,7 @@ TEST(ImuSensor, OverridesStandAndTheRestIsThePresets) {
   ASSERT_TRUE(table.set("imu.gyro_density", "0.5", "test"));
   ASSERT_TRUE(table.set("imu.line_2.gyro_y_deg_s", "3", "test"));
   EXPECT_FALSE(table.set("imu.rate_hz", "0", "test"));
-  const ImuConfig r = resolve(c);
+  const ImuConfig r = with_preset_values(c);
   EXPECT_EQ(r.gyro_density, 0.5);
   EXPECT_EQ(r.gyro_range_deg_s, 1000);
   EXPECT_EQ(r.lines[1].gyro_deg_s[1], 3);

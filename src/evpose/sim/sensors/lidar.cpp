@@ -21,7 +21,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kStream = 1ULL << 41;
 constexpr double kMostPoints = 5e7;
 
-/// What is hit, from the triangle's corners.
+/// Surface at a hit point.
 struct Surface {
   Vector3d normal;  ///< unit
   double reflectance = 0;
@@ -62,26 +62,27 @@ LidarConfig::LidarConfig() {
 
 void describe(ConfigTable& table, LidarConfig& c) {
   table.add("on", c.on, "map the world by LiDAR: map_raw.ply");
-  table.add("points_per_s", c.points_per_s, "1/s", "beams a second", {1, 1e7});
-  table.add("keep_every", c.keep_every, "", "of the points, one in so many is kept", {1, 1000000});
+  table.add("points_per_s", c.points_per_s, "1/s", "pulse rate", {1, 1e7});
+  table.add("keep_every", c.keep_every, "", "every n-th point is kept", {1, 1000000});
   table.add("scan_s", c.scan_s, "s", "length of a scan", {1e-3, 100});
-  table.add("down_deg", c.down_deg, "deg", "lower border of the field of view", {-89, 89});
-  table.add("up_deg", c.up_deg, "deg", "upper border of the field of view", {-89, 89});
-  table.add("mount_pitch_deg", c.mount_pitch_deg, "deg", "the sensor's nose down", {-180, 180});
+  table.add("down_deg", c.down_deg, "deg", "lower limit of the field of view", {-89, 89});
+  table.add("up_deg", c.up_deg, "deg", "upper limit of the field of view", {-89, 89});
+  table.add("mount_pitch_deg", c.mount_pitch_deg, "deg", "pitch of the sensor, positive down", {-180, 180});
   table.add("range_sigma_m", c.range_sigma_m, "m", "noise along the beam, 1 sigma", {0, 10});
-  table.add("range_min_m", c.range_min_m, "m", "nearest echo", {0, 1000});
-  table.add("range_max_m", c.range_max_m, "m", "farthest echo", {0.1, 1e4});
-  table.add("max_incidence_deg", c.max_incidence_deg, "deg", "no echo from surfaces seen flatter", {1, 90});
-  table.add("beam_deg", c.beam_deg, "deg", "full width of a beam", {0, 5});
-  table.add("mixed_m", c.mixed_m, "m", "a beam across a step of depth is off by up to this", {0, 10});
-  table.add("registration_m", c.registration_m, "m", "error of each scan's place, 1 sigma", {0, 10});
-  table.add("registration_deg", c.registration_deg, "deg", "error of each scan's attitude, 1 sigma", {0, 90});
+  table.add("range_min_m", c.range_min_m, "m", "shortest range", {0, 1000});
+  table.add("range_max_m", c.range_max_m, "m", "longest range", {0.1, 1e4});
+  table.add("max_incidence_deg", c.max_incidence_deg, "deg",
+            "no return from surfaces at a larger angle of incidence", {1, 90});
+  table.add("beam_deg", c.beam_deg, "deg", "full divergence of a beam", {0, 5});
+  table.add("mixed_m", c.mixed_m, "m", "limit of the mixed-pixel error at a depth step", {0, 10});
+  table.add("registration_m", c.registration_m, "m", "position error of each scan, 1 sigma", {0, 10});
+  table.add("registration_deg", c.registration_deg, "deg", "attitude error of each scan, 1 sigma", {0, 90});
   table.group("flight", c.flight);
 }
 
 Vector3d lidar_beam(const LidarConfig& c, double t_s) {
-  // Strokes up and down while the head turns. Neither frequency is a multiple of the other, so that later
-  // turns fill the gaps of earlier ones.
+  // Elevation strokes while the head rotates. The frequencies are incommensurate, so that later revolutions
+  // fill the gaps of earlier ones.
   constexpr double kTurn_hz = 10.3819660113;
   constexpr double kStroke_hz = 2000 / std::numbers::phi;
   const double azimuth = 2 * std::numbers::pi * std::fmod(kTurn_hz * t_s, 1.0);
@@ -92,9 +93,9 @@ Vector3d lidar_beam(const LidarConfig& c, double t_s) {
           std::sin(elevation)};
 }
 
-Lidar::Lidar(const RayCaster& look, const Trajectory& trajectory, const LidarConfig& config,
+Lidar::Lidar(const RayCaster& rays, const Trajectory& trajectory, const LidarConfig& config,
              std::uint64_t seed)
-    : look_(look), trajectory_(trajectory), config_(config), seed_(seed) {}
+    : rays_(rays), trajectory_(trajectory), config_(config), seed_(seed) {}
 
 int Lidar::scans() const {
   return static_cast<int>(std::ceil(trajectory_.duration_s() / config_.scan_s - 1e-9));
@@ -109,7 +110,7 @@ std::vector<CloudPoint> Lidar::scan(int number) const {
   const double start_s = config_.scan_s * number,
                end_s = std::min(start_s + config_.scan_s, trajectory_.duration_s());
   const Pose T_body_lidar{so3::exp({0, kDegree * config_.mount_pitch_deg, 0}), Vector3d::Zero()};
-  // Registration turns and shifts a scan about the sensor.
+  // The registration error rotates and shifts a scan about the sensor.
   const Pose T_map_middle = trajectory_.at(0.5 * (start_s + end_s)).T_map_body;
   const Vector3d shift = normal(config_.registration_m);
   const Eigen::Quaterniond turn = so3::exp(normal(kDegree * config_.registration_deg));
@@ -126,21 +127,21 @@ std::vector<CloudPoint> Lidar::scan(int number) const {
     const Vector3d beam = T_map_lidar.q * lidar_beam(config_, t_s);
     const double noise_m = config_.range_sigma_m * random.normal();
     const auto far = static_cast<float>(config_.range_max_m);
-    const auto hit = look_.trace(T_map_lidar.p, beam, 0, far);
+    const auto hit = rays_.trace(T_map_lidar.p, beam, 0, far);
     if (!hit) continue;
     const double centre_m = hit->distance;
     const Vector3d point = T_map_lidar.p + centre_m * beam;
-    const Surface surface = surface_at(look_.scene(), *hit, point, 2 * radius * centre_m);
+    const Surface surface = surface_at(rays_.scene(), *hit, point, 2 * radius * centre_m);
     if (std::abs(surface.normal.dot(beam)) < least_cosine) continue;
 
-    // The beam's rim sees other ranges where it straddles a step.
+    // Mixed pixel: the rim of the beam measures other ranges at a depth step.
     const Vector3d across = beam.unitOrthogonal(), other = beam.cross(across);
     double sum = centre_m;
     int echoes = 1;
     for (const auto& [x, y] : std::array<std::pair<double, double>, 4>{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}}) {
       if (config_.mixed_m <= 0 || radius <= 0) break;
       const Vector3d rim = beam + radius * (x * across + y * other);
-      if (const auto echo = look_.trace(T_map_lidar.p, rim, 0, far)) sum += echo->distance, ++echoes;
+      if (const auto echo = rays_.trace(T_map_lidar.p, rim, 0, far)) sum += echo->distance, ++echoes;
     }
     const double mixed = std::clamp(sum / echoes - centre_m, -config_.mixed_m, config_.mixed_m);
     const double range = centre_m + mixed + noise_m;
@@ -154,12 +155,12 @@ std::vector<CloudPoint> Lidar::scan(int number) const {
   return points;
 }
 
-Status write_lidar(const std::string& path, const RayCaster& look, const LidarConfig& config,
+Status write_lidar(const std::string& path, const RayCaster& rays, const LidarConfig& config,
                    std::uint64_t seed, ThreadPool& pool) {
   if (!config.on) return {};
   const auto trajectory = make_trajectory(config.flight);
   if (!trajectory) return trajectory.error();
-  const Lidar lidar(look, *trajectory, config, seed);
+  const Lidar lidar(rays, *trajectory, config, seed);
   const double beams = trajectory->duration_s() * config.points_per_s / config.keep_every;
   if (beams > kMostPoints)
     return Error{"lidar.keep_every", text(beams, " points are too many"),

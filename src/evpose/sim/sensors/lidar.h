@@ -17,21 +17,21 @@ class ThreadPool;
 
 namespace evpose::sim {
 
-/// A LiDAR like Livox' MID-360 and the flight that maps the world with it.
+/// A LiDAR like the Livox MID-360 and the mapping flight with it.
 struct LidarConfig {
   LidarConfig();
 
   bool on = false;
   double points_per_s = 200000;
-  int keep_every = 4;                 ///< of the points, one in so many is kept
-  double scan_s = 0.1;                ///< points with one registration error
-  double down_deg = -7, up_deg = 52;  ///< field of view over the sensor's horizon; all round
-  double mount_pitch_deg = 25;        ///< the sensor's nose down
+  int keep_every = 4;                 ///< every n-th point is kept
+  double scan_s = 0.1;                ///< length of a scan, which has one registration error
+  double down_deg = -7, up_deg = 52;  ///< vertical field of view; 360 degrees horizontally
+  double mount_pitch_deg = 25;        ///< pitch of the sensor, positive down
   double range_sigma_m = 0.015;       ///< noise along the beam
   double range_min_m = 0.1, range_max_m = 40;
-  double max_incidence_deg = 86;  ///< no echo from surfaces seen flatter
-  double beam_deg = 0.14;         ///< full width
-  double mixed_m = 0.03;          ///< most by which a beam across a step of depth is drawn to its other part
+  double max_incidence_deg = 86;  ///< no return from surfaces at a larger angle of incidence
+  double beam_deg = 0.14;         ///< full divergence
+  double mixed_m = 0.03;          ///< limit of the mixed-pixel error of a beam across a depth step
   double registration_m = 0, registration_deg = 0;  ///< error of each scan, 1 sigma of each axis
   TrajectoryConfig flight;
 };
@@ -40,18 +40,18 @@ void describe(ConfigTable& table, LidarConfig& config);
 /// Unit vector of the beam at a time, sensor frame (x forward, y left, z up). The pattern does not repeat.
 Eigen::Vector3d lidar_beam(const LidarConfig& config, double t_s);
 
-/// Takes scans of what stands still. May be used from several threads.
+/// Scans the static scene. May be used from several threads.
 class Lidar {
  public:
-  /// Keeps references, but for the config.
-  Lidar(const RayCaster& look, const Trajectory& trajectory, const LidarConfig& config, std::uint64_t seed);
+  /// Keeps references, except for the config.
+  Lidar(const RayCaster& rays, const Trajectory& trajectory, const LidarConfig& config, std::uint64_t seed);
 
   int scans() const;
   /// Points of one scan as registered, map frame. Depends on nothing but its number and the seed.
   std::vector<CloudPoint> scan(int number) const;
 
  private:
-  const RayCaster& look_;
+  const RayCaster& rays_;
   const Trajectory& trajectory_;
   LidarConfig config_;
   std::uint64_t seed_;
@@ -59,7 +59,7 @@ class Lidar {
 
 /// Flies, scans and writes the merged cloud, unless off. Errors: no such flight, too many points, or the file
 /// cannot be written.
-Status write_lidar(const std::string& path, const RayCaster& look, const LidarConfig& config,
+Status write_lidar(const std::string& path, const RayCaster& rays, const LidarConfig& config,
                    std::uint64_t seed, ThreadPool& pool);
 
 }  // namespace evpose::sim

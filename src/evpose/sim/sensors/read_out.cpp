@@ -20,9 +20,8 @@ TimeNs whole_us(TimeNs t) {
 }  // namespace
 
 void describe(ConfigTable& table, ReadOutConfig& c) {
-  table.add("max_rate_mev_s", c.max_rate_mev_s, "Mev/s", "most events that are read out; 0: no limit",
-            {0, 1e4});
-  table.add("queue_events", c.queue_events, "", "events that may wait to be read; more are lost",
+  table.add("max_rate_mev_s", c.max_rate_mev_s, "Mev/s", "rate limit of the read-out; 0: none", {0, 1e4});
+  table.add("queue_events", c.queue_events, "", "capacity of the read-out queue; further events are lost",
             {1, 100000000});
 }
 

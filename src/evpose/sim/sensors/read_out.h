@@ -14,29 +14,29 @@ class ConfigTable;
 
 namespace evpose::sim {
 
-/// The way of events from the pixels to the outside.
+/// Read-out of the events from the pixel array.
 struct ReadOutConfig {
-  double max_rate_mev_s = 100;  ///< million events a second at most; 0: no limit, nothing late or lost
-  int queue_events = 20000;     ///< that may wait; what comes on top is lost
+  double max_rate_mev_s = 100;  ///< limit, million events per second; 0: unlimited, nothing delayed or lost
+  int queue_events = 20000;     ///< capacity of the queue; further events are lost
 };
 void describe(ConfigTable& table, ReadOutConfig& config);
 
-/// An arbiter that takes one event at a time. In a burst events wait in their rows; it goes from row to row,
-/// downwards and round, and empties what stood in the row when it came. The stamp is the time of reading, in
-/// whole microseconds, rounded down.
+/// A row arbiter that reads one event at a time. In a burst events queue in their rows. The arbiter visits
+/// the rows cyclically downwards and reads the events that are queued in a row at its arrival. The timestamp
+/// is the time of reading, rounded down to whole microseconds.
 class ReadOut {
  public:
   ReadOut(ImageSize size, const ReadOutConfig& config);
 
   /// `events`: sorted by t, none after `until`, none before or at the `until` of the last call. Appends to
-  /// `delivered`, in order of stamp, what is read up to then.
+  /// `delivered`, in order of timestamp, the events that are read until then.
   void push(std::span<const SimEvent> events, TimeNs until, std::vector<SimEvent>& delivered);
-  /// Reads what still waits.
+  /// Reads the rest of the queue.
   void finish(std::vector<SimEvent>& delivered);
 
   struct Counts {
     std::int64_t in = 0, delivered = 0, lost = 0;
-    std::int64_t late = 0;  ///< delivered with another microsecond than that of their pixel
+    std::int64_t late = 0;  ///< events delivered with a later microsecond than that of their pixel
   };
   const Counts& counts() const { return counts_; }
 

@@ -69,7 +69,7 @@ TEST(ReadOut, WithoutLimitStampsAreRoundedDownAndNothingElseChanges) {
   EXPECT_EQ(read_out.counts().lost, 0);
 }
 
-TEST(ReadOut, BelowTheLimitNothingIsLateOrLost) {
+TEST(ReadOut, BelowTheLimitNothingIsDelayedOrLost) {
   auto events = random_events(20000, 100, 2);
   // At least 50 ns apart: 20 Mev/s at any moment.
   for (std::size_t i = 1; i < events.size(); ++i) events[i].t = std::max(events[i].t, events[i - 1].t + 50);

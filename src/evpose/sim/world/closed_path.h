@@ -6,8 +6,8 @@
 
 namespace evpose::sim {
 
-/// A closed curve through points, with four continuous derivatives, by its own length: what moves along it at
-/// constant speed has no jerk.
+/// A closed curve through points with four continuous derivatives, parametrized by arc length: motion along
+/// it at constant speed has no jerk.
 class ClosedPath {
  public:
   /// At least three points, metres, neighbours apart from each other.
@@ -17,7 +17,7 @@ class ClosedPath {
   struct At {
     Eigen::Vector3d position, tangent;  ///< metres; unit
   };
-  /// At any distance along it; goes round and round.
+  /// At any distance along it, modulo its length.
   At at(double distance_m) const;
 
  private:

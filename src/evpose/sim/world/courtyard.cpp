@@ -22,7 +22,7 @@ double highest_at(double distance_m) { return kPadTop + distance_m - 0.75 * kPad
 
 class Yard {
  public:
-  explicit Yard(WorldDraft& draft) : d_(draft) {}
+  explicit Yard(WorldBuilder& builder) : d_(builder) {}
 
   void lay_out() {
     const double texel = 0.005;
@@ -67,9 +67,9 @@ class Yard {
       f.window_width = d_.random.uniform(0.9, 1.25);
       f.window_height = d_.random.uniform(1.3, 1.6);
       f.wall = m_.walls[static_cast<std::size_t>(d_.pick(0, static_cast<int>(m_.walls.size()) - 1))];
-      const double yaw = -side * kQuarter;  // looks inwards
+      const double yaw = -side * kQuarter;  // faces inwards
       const V foot = so3::exp(V(0, 0, yaw)) * V(0, along_x ? kHalfY : kHalfX, 0);
-      put_facade(d_, m_, Place(foot, yaw), f);
+      put_facade(d_, m_, Placement(foot, yaw), f);
     }
   }
 
@@ -99,7 +99,7 @@ class Yard {
     V middle;
     double radius;
   };
-  // A free place for a thing of the given size, seldom none.
+  // A free placement for an object of the given size; none if the search fails.
   bool find_place(double radius, double height, V& foot) {
     for (int trial = 0; trial < 200; ++trial) {
       foot = V(d_.random.uniform(-kInnerX + radius, kInnerX - radius),
@@ -133,16 +133,16 @@ class Yard {
                  kOnGround & ~static_cast<unsigned>(side_above));
       add_box_on(d_.scene.mesh, foot + V(0, 0, size.z()), {size.x() + 0.06, size.y() + 0.06, 0.06}, turn,
                  d_.finish(m_.ledge, object));
-      const Place top(foot + V(0, 0, size.z() + 0.06), turn);
+      const Placement top(foot + V(0, 0, size.z() + 0.06), turn);
       put_box(d_, top, V(-0.4 * size.x(), -0.15, 0), V(0.4 * size.x(), 0.15, d_.random.uniform(0.1, 0.25)),
               d_.finish(m_.grounds[3], object), kOnGround);
     }
     for (int i = 0; i < 3; ++i)
-      if (find_place(0.85, 0.9, foot)) put_bench(d_, furniture_, Place(foot, yaw()), 1.5);
+      if (find_place(0.85, 0.9, foot)) put_bench(d_, furniture_, Placement(foot, yaw()), 1.5);
     for (int i = 0; i < 2; ++i) {  // a board on two legs
       if (!find_place(0.95, 1.9, foot)) continue;
-      const Place place(foot, yaw());
-      put_picture(d_, furniture_, Place(place.T_map_thing), 1.35, 1.7, 1.1);
+      const Placement place(foot, yaw());
+      put_picture(d_, furniture_, Placement(place.T_map_object), 1.35, 1.7, 1.1);
       const std::int32_t object = d_.add_object("board");
       put_box(d_, place, V(-0.85, 0, 0.8), V(0.85, 0.03, 1.9), d_.finish(furniture_.metal, object));
       for (const double x : {-0.7, 0.64})
@@ -150,22 +150,22 @@ class Yard {
     }
     for (int i = 0; i < 9; ++i)
       if (find_place(0.5, 0.75, foot))
-        put_cartons(d_, furniture_, Place(foot, yaw()), d_.random.uniform(0.45, 0.75), 0.75);
+        put_cartons(d_, furniture_, Placement(foot, yaw()), d_.random.uniform(0.45, 0.75), 0.75);
     for (int i = 0; i < 12; ++i)
       if (find_place(0.28, 0.3, foot))
-        put_cartons(d_, furniture_, Place(foot, yaw()), d_.random.uniform(0.25, 0.4), 0.3);
+        put_cartons(d_, furniture_, Placement(foot, yaw()), d_.random.uniform(0.25, 0.4), 0.3);
   }
 
   void add_along_walls() {
     for (const double sx : {-1.0, 1.0})
       for (const double sy : {-1.0, 1.0})
-        put_lamp_post(d_, m_, Place(V(sx * 10.6, sy * 8.3, 0), sy > 0 ? 0 : 2 * kQuarter), 4.6, 0.3);
+        put_lamp_post(d_, m_, Placement(V(sx * 10.6, sy * 8.3, 0), sy > 0 ? 0 : 2 * kQuarter), 4.6, 0.3);
     for (int i = 0; i < 5; ++i) {
       const double x = -8 + 4 * i + d_.random.uniform(-0.8, 0.8);
       if (d_.chance(0.5))
-        put_bench(d_, furniture_, Place(V(x, -9.3, 0), 2 * kQuarter), 1.6);
+        put_bench(d_, furniture_, Placement(V(x, -9.3, 0), 2 * kQuarter), 1.6);
       else
-        put_cartons(d_, furniture_, Place(V(x, -9.2, 0), d_.random.uniform(-0.3, 0.3)),
+        put_cartons(d_, furniture_, Placement(V(x, -9.2, 0), d_.random.uniform(-0.3, 0.3)),
                     d_.random.uniform(0.6, 0.9), 1.6);
     }
     for (const double sx : {-1.0, 1.0})
@@ -229,7 +229,7 @@ class Yard {
     }
   }
 
-  WorldDraft& d_;
+  WorldBuilder& d_;
   OutdoorMaterials m_;
   FurnitureMaterials furniture_;
   std::vector<Circle> taken_;
@@ -237,7 +237,7 @@ class Yard {
 
 }  // namespace
 
-void lay_out_courtyard(WorldDraft& d) {
+void build_courtyard(WorldBuilder& d) {
   d.scene.name = "courtyard";
   d.scene.low = {-4.5, -4.5, 0.4};
   d.scene.high = {4.5, 4.5, 7};

@@ -16,7 +16,7 @@ struct Bay {
   bool door, balcony;
 };
 
-std::vector<Bay> bays(WorldDraft& d, const Facade& f) {
+std::vector<Bay> bays(WorldBuilder& d, const Facade& f) {
   std::vector<Bay> all;
   const int columns = std::max(1, static_cast<int>(f.width / f.bay)),
             storeys = std::max(1, static_cast<int>(f.height / f.storey));
@@ -40,14 +40,14 @@ std::vector<Bay> bays(WorldDraft& d, const Facade& f) {
   return all;
 }
 
-void put_window(WorldDraft& d, const OutdoorMaterials& m, const Place& place, const Opening& o,
+void put_window(WorldBuilder& d, const OutdoorMaterials& m, const Placement& place, const Opening& o,
                 std::int32_t object) {
   const double back = kReveal, front = kReveal - kBar, middle = 0.5 * (o.u0 + o.u1),
                cross = o.v0 + 0.62 * (o.v1 - o.v0);
   const Finish bars = d.finish(m.frame, object);
   add_face(d.scene.mesh,
-           {place.T_map_thing * V(o.u0, back, o.v0), place.T_map_thing.q * V(o.u1 - o.u0, 0, 0),
-            place.T_map_thing.q * V(0, 0, o.v1 - o.v0)},
+           {place.T_map_object * V(o.u0, back, o.v0), place.T_map_object.q * V(o.u1 - o.u0, 0, 0),
+            place.T_map_object.q * V(0, 0, o.v1 - o.v0)},
            d.finish(m.glass, object));
   put_box(d, place, V(middle - 0.5 * kBar, front, o.v0), V(middle + 0.5 * kBar, back, o.v1), bars,
           side_west | side_east | side_south);
@@ -61,7 +61,7 @@ void put_window(WorldDraft& d, const OutdoorMaterials& m, const Place& place, co
             d.finish(m.ledge, object), kOnWall);
 }
 
-void put_balcony(WorldDraft& d, const OutdoorMaterials& m, const Place& place, const Opening& o,
+void put_balcony(WorldBuilder& d, const OutdoorMaterials& m, const Placement& place, const Opening& o,
                  std::int32_t object) {
   const double u0 = o.u0 - 0.35, u1 = o.u1 + 0.35, z = o.v0 - 0.3, deep = 0.8;
   put_box(d, place, V(u0, -deep, z - 0.14), V(u1, 0, z), d.finish(m.concrete, object), kOnWall);
@@ -79,7 +79,7 @@ void put_balcony(WorldDraft& d, const OutdoorMaterials& m, const Place& place, c
 
 }  // namespace
 
-OutdoorMaterials add_outdoor_materials(WorldDraft& d, double texel_m) {
+OutdoorMaterials add_outdoor_materials(WorldBuilder& d, double texel_m) {
   OutdoorMaterials m;
   const Repeat wide{6, 6}, small{3, 3};
   const auto tone = [&](double low, double high) { return d.random.uniform(low, high); };
@@ -90,8 +90,8 @@ OutdoorMaterials add_outdoor_materials(WorldDraft& d, double texel_m) {
   wall("stucco", stucco(wide, d.seed()));
   wall("concrete wall", concrete(wide, d.seed()));
   wall("painted wall", graffiti(wide, d.seed()));
-  m.walls.push_back(d.materials.add_toned("dark bricks", tone(0.5, 0.7), m.walls[0]));
-  m.walls.push_back(d.materials.add_toned("bright stucco", tone(1.2, 1.4), m.walls[1]));
+  m.walls.push_back(d.materials.add_with_tone("dark bricks", tone(0.5, 0.7), m.walls[0]));
+  m.walls.push_back(d.materials.add_with_tone("bright stucco", tone(1.2, 1.4), m.walls[1]));
   const auto ground = [&](const char* name, Pattern pattern) {
     m.grounds.push_back(d.materials.add_textured(name, tone(0.6, 0.9), wide, texel_m, std::move(pattern)));
   };
@@ -105,21 +105,21 @@ OutdoorMaterials add_outdoor_materials(WorldDraft& d, double texel_m) {
   m.glass =
       d.materials.add_textured("window panes", 0.9, {4, 4}, 0.006, window_panes({4, 4}, 0.55, d.seed()));
   m.door = d.materials.add_textured("doors", tone(0.4, 0.8), small, 0.004, planks(small, 0.14, d.seed()));
-  m.frame = d.materials.add_toned("window frames", tone(1.0, 1.5), m.concrete);
-  m.ledge = d.materials.add_toned("ledges", tone(1.0, 1.4), m.concrete);
-  m.pole = d.materials.add_toned("poles", tone(0.25, 0.5), m.container);
-  m.lamp = d.config.night ? d.materials.add_glowing("street lamp", 3e3 * d.config.lamp_lux / 20, -1)
+  m.frame = d.materials.add_with_tone("window frames", tone(1.0, 1.5), m.concrete);
+  m.ledge = d.materials.add_with_tone("ledges", tone(1.0, 1.4), m.concrete);
+  m.pole = d.materials.add_with_tone("poles", tone(0.25, 0.5), m.container);
+  m.lamp = d.config.night ? d.materials.add_emissive("street lamp", 3e3 * d.config.lamp_lux / 20, -1)
                           : d.materials.add_plain("street lamp", 0.7);
   return m;
 }
 
-void put_facade(WorldDraft& d, const OutdoorMaterials& m, const Place& place, const Facade& f) {
+void put_facade(WorldBuilder& d, const OutdoorMaterials& m, const Placement& place, const Facade& f) {
   const std::int32_t object = d.add_object("facade");
-  const Place corner(place.T_map_thing * Pose{Eigen::Quaterniond::Identity(), {-0.5 * f.width, 0, 0}});
+  const Placement corner(place.T_map_object * Pose{Eigen::Quaterniond::Identity(), {-0.5 * f.width, 0, 0}});
   const std::vector<Bay> all = bays(d, f);
   std::vector<Opening> openings;
   for (const Bay& bay : all) openings.push_back(bay.opening);
-  const Pose& T = corner.T_map_thing;
+  const Pose& T = corner.T_map_object;
   add_wall(d.scene.mesh, {T.p, T.q * V(f.width, 0, 0), T.q * V(0, 0, f.height)}, openings, kReveal,
            d.finish(f.wall, object), d.finish(m.ledge, object));
   for (const Bay& bay : all) {
@@ -151,16 +151,16 @@ void put_facade(WorldDraft& d, const OutdoorMaterials& m, const Place& place, co
           side_south | side_above);
 }
 
-void put_lamp_post(WorldDraft& d, const OutdoorMaterials& m, const Place& place, double height_m,
+void put_lamp_post(WorldBuilder& d, const OutdoorMaterials& m, const Placement& place, double height_m,
                    double arm_m) {
   const std::int32_t object = d.add_object("lamp post");
-  put_post(d, place.T_map_thing.p, {0.12, 0.7, 24}, d.finish(m.pole, object));
-  put_post(d, place.T_map_thing * V(0, 0, 0.7), {0.06, height_m - 0.7, 20}, d.finish(m.pole, object));
+  put_post(d, place.T_map_object.p, {0.12, 0.7, 24}, d.finish(m.pole, object));
+  put_post(d, place.T_map_object * V(0, 0, 0.7), {0.06, height_m - 0.7, 20}, d.finish(m.pole, object));
   put_box(d, place, V(-0.04, -arm_m, height_m - 0.3), V(0.04, -0.055, height_m - 0.2),
           d.finish(m.pole, object), all_sides & ~static_cast<unsigned>(side_north));
   const V low(-0.14, -arm_m - 0.6, height_m - 0.34), high(0.14, -arm_m, height_m - 0.18);
   put_box(d, place, low, high, d.finish(m.pole, object), all_sides & ~static_cast<unsigned>(side_below));
-  const Pose& T = place.T_map_thing;
+  const Pose& T = place.T_map_object;
   add_face(d.scene.mesh, {T * V(low.x(), high.y(), low.z()), T.q * V(0.28, 0, 0), T.q * V(0, -0.6, 0)},
            {m.lamp, object, {0, 0}});
   if (!d.config.night) return;
@@ -169,7 +169,8 @@ void put_lamp_post(WorldDraft& d, const OutdoorMaterials& m, const Place& place,
   light.kind = LightKind::lamp;
   light.position = T * V(0, -arm_m - 0.3, height_m - 0.42);
   light.radius = 0.12;
-  light.strength = d.config.lamp_lux / 20 * height_m * height_m;  // a twentieth of what lights a room
+  light.strength =
+      d.config.lamp_lux / 20 * height_m * height_m;  // a twentieth of lamp_lux on the ground below
   d.scene.lights.push_back(light);
 }
 

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "evpose/sim/world/furniture.h"
-#include "evpose/sim/world/world_draft.h"
+#include "evpose/sim/world/world_builder.h"
 
 namespace evpose::sim {
 namespace {
@@ -26,7 +26,7 @@ struct Hall {
 // The window lies in the far wall (x = 8), metres along y and z.
 constexpr Opening kWindow{3.55, 5.15, 0.95, 2.25};
 
-Hall add_materials(WorldDraft& d) {
+Hall add_materials(WorldBuilder& d) {
   Hall h;
   h.furniture = add_furniture_materials(d, kTexel_m);
   const Repeat wall{4, 3};
@@ -45,11 +45,11 @@ Hall add_materials(WorldDraft& d) {
   h.pillar = d.materials.add_textured("marble", tone(0.9, 1.2), {2, 3}, kTexel_m, marble({2, 3}, d.seed()));
   h.carpet =
       d.materials.add_textured("carpet", tone(0.7, 1.1), {3, 2.4}, kTexel_m, carpet({3, 2.4}, d.seed()));
-  h.skirting = d.materials.add_toned("skirting", 0.6, h.furniture.woods[0]);
+  h.skirting = d.materials.add_with_tone("skirting", 0.6, h.furniture.woods[0]);
   return h;
 }
 
-void add_shell(WorldDraft& d, const Hall& h) {
+void add_shell(WorldBuilder& d, const Hall& h) {
   Mesh& mesh = d.scene.mesh;
   const std::int32_t floor = d.add_object("floor"), ceiling = d.add_object("ceiling"),
                      walls = d.add_object("walls");
@@ -79,7 +79,7 @@ void add_shell(WorldDraft& d, const Hall& h) {
 }
 
 // Bars across the window, a sill, and what is seen through it: sky, a house, roofs.
-void add_window(WorldDraft& d, const Hall& h) {
+void add_window(WorldBuilder& d, const Hall& h) {
   Mesh& mesh = d.scene.mesh;
   const std::int32_t frame = d.add_object("window"), outside = d.add_object("outside");
   const Finish bars = d.finish(h.furniture.white, frame);
@@ -94,10 +94,10 @@ void add_window(WorldDraft& d, const Hall& h) {
                   V(kLength, kWindow.u1 + 0.1, kWindow.v0 - 0.01), d.finish(h.furniture.white, frame),
                   all_sides & ~static_cast<unsigned>(side_east));
   const double sky = d.config.night ? 0.02 : d.config.window_cd_m2;
-  const std::int32_t bright = d.materials.add_glowing("sky outside", sky, -1);
-  const std::int32_t wall = d.materials.add_glowing("house outside", 0.4 * sky, -1);
-  const std::int32_t pane = d.materials.add_glowing("panes outside", 0.12 * sky, -1);
-  const std::int32_t roof = d.materials.add_glowing("roofs outside", 0.22 * sky, -1);
+  const std::int32_t bright = d.materials.add_emissive("sky outside", sky, -1);
+  const std::int32_t wall = d.materials.add_emissive("house outside", 0.4 * sky, -1);
+  const std::int32_t pane = d.materials.add_emissive("panes outside", 0.12 * sky, -1);
+  const std::int32_t roof = d.materials.add_emissive("roofs outside", 0.22 * sky, -1);
   const auto sheet = [&](double x, const Opening& at, std::int32_t material) {
     add_face(mesh, {V(x, at.u1, at.v0), V(0, at.u0 - at.u1, 0), V(0, 0, at.v1 - at.v0)},
              {material, outside, {0, 0}});
@@ -115,9 +115,9 @@ void add_window(WorldDraft& d, const Hall& h) {
             pane);
 }
 
-void add_lights(WorldDraft& d, const Hall& h) {
+void add_lights(WorldBuilder& d, const Hall& h) {
   Scene& scene = d.scene;
-  constexpr double kFill = 0.3;  // share of the lamps' light that comes from walls and ceiling
+  constexpr double kFill = 0.3;  // fraction of the lamp light that walls and ceiling reflect
   const double lengths[3] = {1.4, 3.9, 6.6};
   const V middle(0.5 * kLength, 0.5 * kWidth, 0.75);
   for (int i = 0; i < 3; ++i) {
@@ -130,7 +130,7 @@ void add_lights(WorldDraft& d, const Hall& h) {
     scene.lights.push_back(lamp);
   }
   const double candela = (1 - kFill) * d.config.lamp_lux / lamp_lux_at(scene, middle);
-  const std::int32_t glow = d.materials.add_glowing("lamp glass", candela / 0.26, 0);
+  const std::int32_t glow = d.materials.add_emissive("lamp glass", candela / 0.26, 0);
   for (Light& lamp : scene.lights) {
     lamp.strength = candela;
     const V half(0.11, 0.65, 0.03), at = lamp.position + V(0, 0, 0.07);
@@ -166,20 +166,20 @@ void add_lights(WorldDraft& d, const Hall& h) {
   scene.lights.push_back(indirect);
 }
 
-// A row of things along a wall: `at(along)` gives the place, from `begin` to `end` along it.
+// A row of furniture along a wall from `begin` to `end`; `at(along)` is the placement.
 struct WallRow {
   double begin, end, yaw;
   V origin, direction;
-  double shelves;  // share of bookshelves; negative: nothing higher than a window sill
+  double shelves;  // fraction of bookshelves; negative: nothing higher than a window sill
 };
-void furnish_wall(WorldDraft& d, const Hall& h, const WallRow& row) {
+void furnish_wall(WorldBuilder& d, const Hall& h, const WallRow& row) {
   const FurnitureMaterials& m = h.furniture;
   double along = row.begin;
   while (along < row.end - 0.5) {
     const double width = std::min(d.random.uniform(0.75, 1.15), row.end - along);
     const V foot = row.origin + (along + 0.5 * width) * row.direction;
-    const Place place(foot, row.yaw);
-    const Place on_wall(place.T_map_thing * Pose{Eigen::Quaterniond::Identity(), {0, kGap, 0}});
+    const Placement place(foot, row.yaw);
+    const Placement on_wall(place.T_map_object * Pose{Eigen::Quaterniond::Identity(), {0, kGap, 0}});
     const double pick = d.random.uniform();
     if (row.shelves < 0) {
       put_cupboard(d, m, place, {width, 0.42, 0.72});
@@ -188,7 +188,7 @@ void furnish_wall(WorldDraft& d, const Hall& h, const WallRow& row) {
     } else if (pick < 0.5 + 0.5 * row.shelves - 0.1) {
       put_cupboard(d, m, place, {width, d.random.uniform(0.38, 0.5), d.chance(0.5) ? 1.9 : 1.1});
     } else {
-      put_cartons(d, m, Place(place.T_map_thing * Pose{{1, 0, 0, 0}, {0, -0.35, 0}}), 0.55, 0.95);
+      put_cartons(d, m, Placement(place.T_map_object * Pose{{1, 0, 0, 0}, {0, -0.35, 0}}), 0.55, 0.95);
       if (d.chance(0.6))
         put_picture(d, m, on_wall, d.random.uniform(1.6, 1.9), d.random.uniform(0.6, 0.9),
                     d.random.uniform(0.6, 0.9));
@@ -199,7 +199,7 @@ void furnish_wall(WorldDraft& d, const Hall& h, const WallRow& row) {
   }
 }
 
-void furnish(WorldDraft& d, const Hall& h) {
+void furnish(WorldBuilder& d, const Hall& h) {
   const FurnitureMaterials& m = h.furniture;
   furnish_wall(d, h, {0.35, 3.3, -kQuarter, {kLength - kGap, 0, 0}, {0, 1, 0}, 0.85});
   furnish_wall(d, h, {3.45, 5.3, -kQuarter, {kLength - kGap, 0, 0}, {0, 1, 0}, -1});
@@ -207,21 +207,22 @@ void furnish(WorldDraft& d, const Hall& h) {
   furnish_wall(d, h, {0.4, 7.2, 0, {0, kWidth - kGap, 0}, {1, 0, 0}, 0.55});
   furnish_wall(d, h, {0.8, 5.2, kQuarter, {kGap, 0, 0}, {0, 1, 0}, 0.55});
   for (int i = 0; i < 3; ++i)  // above what stands at the walls
-    put_poster(d, m, Place({1.2 + 2.2 * i, 0, 0}, std::numbers::pi), -0.3, 2.28 - 0.2 * d.random.uniform());
+    put_poster(d, m, Placement({1.2 + 2.2 * i, 0, 0}, std::numbers::pi), -0.3,
+               2.28 - 0.2 * d.random.uniform());
   // Two tables beyond the aisle, chairs at them, a table behind.
   for (const double y : {1.75, 4.2}) {
-    const Place table({6.65 + d.random.uniform(-0.08, 0.08), y + d.random.uniform(-0.12, 0.12), 0},
-                      -kQuarter + d.random.uniform(-0.12, 0.12));
+    const Placement table({6.65 + d.random.uniform(-0.08, 0.08), y + d.random.uniform(-0.12, 0.12), 0},
+                          -kQuarter + d.random.uniform(-0.12, 0.12));
     put_table(d, m, table, {d.random.uniform(1.25, 1.6), d.random.uniform(0.65, 0.75), 0.73});
     for (const double side : {-0.36, 0.36})
-      put_chair(
-          d, m,
-          Place(table.T_map_thing *
-                Pose{so3::exp(V(0, 0, std::numbers::pi + d.random.uniform(-0.4, 0.4))), {side, -0.55, 0}}));
+      put_chair(d, m,
+                Placement(table.T_map_object *
+                          Pose{so3::exp(V(0, 0, std::numbers::pi + d.random.uniform(-0.4, 0.4))),
+                               {side, -0.55, 0}}));
   }
 }
 
-void add_pillars(WorldDraft& d, const Hall& h) {
+void add_pillars(WorldBuilder& d, const Hall& h) {
   const std::int32_t round = d.add_object("round pillar"), square = d.add_object("square pillar");
   const double y = d.random.uniform(0.75, 0.95), swap = d.chance(0.5) ? 1 : -1;
   const V a(5.9, 3 - swap * (3 - y), 0), b(6.1, 3 + swap * (3 - y), 0);
@@ -231,18 +232,18 @@ void add_pillars(WorldDraft& d, const Hall& h) {
 }
 
 // Below the flight: a carpet, cartons and a low table.
-void add_floor_things(WorldDraft& d, const Hall& h) {
+void add_floor_things(WorldBuilder& d, const Hall& h) {
   add_print(d.scene.mesh, {V(1.6, 1.6, 0), V(3.2, 0, 0), V(0, 2.6, 0)}, {0.1, 3.1, 0.1, 2.5},
             d.finish(h.carpet, d.add_object("carpet")));
   const double xs[5] = {1.5, 2.7, 3.6, 4.6, 5.0}, ys[5] = {1.0, 5.0, 1.3, 4.7, 2.4};
   for (int i = 0; i < 5; ++i)
     put_cartons(d, h.furniture,
-                Place({xs[i] + d.random.uniform(-0.3, 0.3), ys[i] + d.random.uniform(-0.25, 0.25), 0},
-                      d.random.uniform(0, 3)),
+                Placement({xs[i] + d.random.uniform(-0.3, 0.3), ys[i] + d.random.uniform(-0.25, 0.25), 0},
+                          d.random.uniform(0, 3)),
                 d.random.uniform(0.3, 0.5), 0.72);
 }
 
-void add_moving_things(WorldDraft& d) {
+void add_moving_things(WorldBuilder& d) {
   const MoversConfig& c = d.config.movers;
   if (c.fans + c.people == 0) return;
   const MoverMaterials m = add_mover_materials(d.materials, d.seed(), kTexel_m);
@@ -272,7 +273,7 @@ void add_moving_things(WorldDraft& d) {
 
 }  // namespace
 
-void lay_out_hall(WorldDraft& d) {
+void build_hall(WorldBuilder& d) {
   d.scene.name = "hall";
   d.scene.low = {1.2, 1.2, 0.85};
   d.scene.high = {5.2, 4.8, 2.4};

@@ -10,7 +10,7 @@
 
 namespace evpose::sim {
 
-/// What a face is covered with, and whose it is.
+/// Material, texture offset and object of a face.
 struct Finish {
   std::int32_t material = 0;
   std::int32_t object = 0;

@@ -9,15 +9,16 @@
 
 namespace evpose::sim {
 
-/// A run of a mesh's edges between the same two surfaces, without a sharp bend.
-struct EdgeRun {
-  std::vector<Eigen::Vector3d> points;  ///< metres; the first again at the end of a closed one
+/// A chain of mesh edges between the same two surfaces, without a sharp bend.
+struct EdgeChain {
+  std::vector<Eigen::Vector3d> points;  ///< metres; a closed chain repeats the first at the end
 };
 
-/// A mesh taken apart into flat or smooth surfaces and the edges that bound them.
+/// A mesh segmented into flat or smooth surfaces and the edges that bound them.
 struct MeshEdges {
   std::vector<std::int32_t> surface_of;  ///< of each triangle: connected and without a crease
-  std::vector<EdgeRun> runs;             ///< creases of more than `crease_rad`, rims, cuts with other bodies
+  std::vector<EdgeChain>
+      chains;  ///< creases of more than `crease_rad`, rims, intersections with other bodies
 };
 MeshEdges find_edges(const Mesh& mesh, double crease_rad);
 

@@ -8,7 +8,7 @@
 
 #include "evpose/core/config.h"
 #include "evpose/sim/world/closed_path.h"
-#include "evpose/sim/world/material_shelf.h"
+#include "evpose/sim/world/material_library.h"
 #include "evpose/sim/world/mesh_builder.h"
 #include "evpose/sim/world/random.h"
 
@@ -38,7 +38,7 @@ Mesh limb(double length, double thick, const Finish& finish) {
   return mesh;
 }
 
-/// How a walking body's parts stand, by the way it has gone.
+/// Poses of the links of a walking body, by the distance walked.
 class Gait {
  public:
   explicit Gait(const Walker& walker)
@@ -146,25 +146,25 @@ void describe(ConfigTable& table, MoversConfig& c) {
   table.add("car_m_s", c.car_m_s, "m/s", "speed of the cars", {0, 40});
 }
 
-MoverMaterials add_mover_materials(MaterialShelf& shelf, std::uint64_t seed, double texel_m) {
+MoverMaterials add_mover_materials(MaterialLibrary& library, std::uint64_t seed, double texel_m) {
   MoverMaterials m;
   const Repeat small{1.2, 1.2}, wide{2, 1.2};
   for (std::uint64_t i = 0; i < 2; ++i) {
-    const auto own = shelf.add_textured("clothes", 0.9, small, texel_m, cloth(small, mix(seed + i)));
+    const auto own = library.add_textured("clothes", 0.9, small, texel_m, cloth(small, mix(seed + i)));
     m.cloths.push_back(own);
-    m.cloths.push_back(shelf.add_toned("dark clothes", 0.35, own));
+    m.cloths.push_back(library.add_with_tone("dark clothes", 0.35, own));
   }
-  const auto paint = shelf.add_textured("car paint", 0.5, wide, texel_m, plaster(wide, mix(seed + 5)));
-  m.paints = {paint, shelf.add_toned("dark car paint", 0.2, paint),
-              shelf.add_toned("bright car paint", 1.2, paint)};
-  const auto rough = shelf.add_textured("rubber", 0.14, small, texel_m, plaster(small, mix(seed + 6)));
+  const auto paint = library.add_textured("car paint", 0.5, wide, texel_m, plaster(wide, mix(seed + 5)));
+  m.paints = {paint, library.add_with_tone("dark car paint", 0.2, paint),
+              library.add_with_tone("bright car paint", 1.2, paint)};
+  const auto rough = library.add_textured("rubber", 0.14, small, texel_m, plaster(small, mix(seed + 6)));
   m.tyre = rough;
-  m.skin = shelf.add_toned("skin", 0.8, rough);
-  m.hair = shelf.add_toned("hair", 0.2, rough);
-  m.shoe = shelf.add_toned("shoe", 0.25, rough);
-  m.metal = shelf.add_toned("bright metal", 1.4, rough);
-  m.glass = shelf.add_textured("car glass", 0.8, small, texel_m, window_panes(small, 0.6, mix(seed + 7)));
-  m.blade = shelf.add_textured("fan blade", 1.1, small, texel_m, tiles(small, 0.15, mix(seed + 8)));
+  m.skin = library.add_with_tone("skin", 0.8, rough);
+  m.hair = library.add_with_tone("hair", 0.2, rough);
+  m.shoe = library.add_with_tone("shoe", 0.25, rough);
+  m.metal = library.add_with_tone("bright metal", 1.4, rough);
+  m.glass = library.add_textured("car glass", 0.8, small, texel_m, window_panes(small, 0.6, mix(seed + 7)));
+  m.blade = library.add_textured("fan blade", 1.1, small, texel_m, tiles(small, 0.15, mix(seed + 8)));
   return m;
 }
 
@@ -189,7 +189,7 @@ void add_fan(Scene& scene, const MoverMaterials& m, const Fan& fan) {
   part.T_map_part = [T = fan.T_map_fan, rate, phase = fan.phase](double t_s) {
     return T * turned({0, 0, 0}, {phase + rate * t_s, 0, 0});
   };
-  // What carries it stands still.
+  // The post is static.
   const std::int32_t stand = add_object(scene, fan.name + " stand");
   const Pose T_map_motor = fan.T_map_fan * shifted({-0.09 - 0.5 * hub.height, 0, 0});
   add_box(scene.mesh, T_map_motor, {0.14, 0.12, 0.12}, {m.metal, stand, {0.4, 0}});

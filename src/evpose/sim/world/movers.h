@@ -15,9 +15,9 @@ class ConfigTable;
 namespace evpose::sim {
 
 class ClosedPath;
-class MaterialShelf;
+class MaterialLibrary;
 
-/// Moving things of a world, at the places that it has for them.
+/// Moving objects of a world, on the paths that it provides for them.
 struct MoversConfig {
   int fans = 0;
   double fan_rpm = 240;
@@ -32,10 +32,9 @@ struct MoverMaterials {
   std::vector<std::int32_t> cloths, paints;
   std::int32_t skin = 0, hair = 0, shoe = 0, glass = 0, tyre = 0, metal = 0, blade = 0;
 };
-MoverMaterials add_mover_materials(MaterialShelf& shelf, std::uint64_t seed, double texel_m);
+MoverMaterials add_mover_materials(MaterialLibrary& library, std::uint64_t seed, double texel_m);
 
-// Each is one object of the scene, and one part for each rigid piece of it. Motions are smooth (C^2) over all
-// times.
+// Each is one object of the scene with one part for each rigid link. Motions are smooth (C^2) at all times.
 
 struct Fan {
   std::string name = "fan";
@@ -44,7 +43,7 @@ struct Fan {
   int blades = 3;
   double rpm = 240;
   double phase = 0;          ///< rad at t = 0
-  double stand_to_z = -1e9;  ///< a post goes down to there, if below the hub
+  double stand_to_z = -1e9;  ///< height of the foot of its post, if below the hub
 };
 void add_fan(Scene& scene, const MoverMaterials& materials, const Fan& fan);
 

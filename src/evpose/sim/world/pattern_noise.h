@@ -8,7 +8,7 @@
 #include "evpose/sim/world/patterns.h"
 #include "evpose/sim/world/random.h"
 
-// What patterns are composed of. All of it closes over the pattern's Repeat.
+// Building blocks of patterns. All are periodic over the Repeat of the pattern.
 namespace evpose::sim {
 
 /// In [0, 1), fixed for a pair of whole numbers.
@@ -52,10 +52,10 @@ class Noise {
   std::vector<float> values_;
 };
 
-/// Discs strewn about, at most one in each cell of a grid, of random size and tone.
+/// Randomly placed discs, at most one in each cell of a grid, of random size and tone.
 class Spots {
  public:
-  /// `density`: share of the cells that have one.
+  /// `density`: fraction of the cells that have one.
   Spots(const Repeat& repeat, double cell_m, double density, std::uint64_t seed);
   /// Tone in [-1, 1] of the disc at the place; 0 where there is none.
   double operator()(double u_m, double v_m) const;
@@ -69,9 +69,9 @@ class Spots {
   std::vector<Spot> spots_;
 };
 
-/// True where a made-up letter has ink; x, y in [0, 1] over the letter, y up.
+/// True where a random letter has ink; x, y in [0, 1] over the letter, y up.
 bool letter_ink(double x, double y, std::uint64_t letter);
-/// True where a line of made-up words has ink. `x_m` along it, `y` in [0, 1] over its letters' height.
+/// True where a line of random words has ink. `x_m` along it, `y` in [0, 1] over its letters' height.
 bool words_ink(double x_m, double y, double letter_m, std::uint64_t seed);
 
 }  // namespace evpose::sim

@@ -11,13 +11,13 @@ namespace evpose::sim {
 /// Reflectance in [0, 1] at (u, v), metres; u runs along the face, v up or away.
 using Pattern = std::function<double(double u_m, double v_m)>;
 
-/// The rectangle over which a pattern repeats itself, without a seam.
+/// The period of a pattern in u and v; it repeats without a seam.
 struct Repeat {
   double width_m = 4, height_m = 4;
 };
 
-// What the faces of a world are covered with: around 0.5 in the mean, with detail of all sizes from a few
-// millimetres to decimetres, irregular within a Repeat. `seed` picks the marks.
+// Procedural textures: 0.5 in the mean, with detail from millimetres to decimetres, irregular within a
+// Repeat. `seed` selects the marks.
 
 // Walls, floors, ceilings (patterns.cpp).
 Pattern bricks(const Repeat& repeat, std::uint64_t seed);

@@ -23,7 +23,7 @@ std::vector<Named> all_patterns() {
   return all;
 }
 
-double share_of_differences(const Pattern& a, const Pattern& b, double shift_u, double shift_v) {
+double fraction_of_differences(const Pattern& a, const Pattern& b, double shift_u, double shift_v) {
   int different = 0;
   for (int i = 0; i < 4000; ++i) {
     const double u = std::fmod(i * 0.61803, 1) * kRepeat.width_m,
@@ -35,8 +35,8 @@ double share_of_differences(const Pattern& a, const Pattern& b, double shift_u, 
 
 TEST(Patterns, AreTheSameForASeedAndDifferBetweenSeeds) {
   for (const Named& p : all_patterns()) {
-    EXPECT_EQ(share_of_differences(p.make(5), p.make(5), 0, 0), 0) << p.name;
-    EXPECT_GT(share_of_differences(p.make(5), p.make(6), 0, 0), 0.15) << p.name;
+    EXPECT_EQ(fraction_of_differences(p.make(5), p.make(5), 0, 0), 0) << p.name;
+    EXPECT_GT(fraction_of_differences(p.make(5), p.make(6), 0, 0), 0.15) << p.name;
   }
 }
 
@@ -46,9 +46,9 @@ TEST(Patterns, RepeatOverTheirRectangleAndNotWithin) {
     const Pattern pattern = p.make(5);
     const bool single = p.name == "poster" || p.name == "screen_text";
     if (!single) {
-      EXPECT_LT(share_of_differences(pattern, pattern, kRepeat.width_m, 0), 0.01) << p.name;
-      EXPECT_LT(share_of_differences(pattern, pattern, 0, kRepeat.height_m), 0.01) << p.name;
-      EXPECT_GT(share_of_differences(pattern, pattern, kRepeat.width_m / 3, 0), 0.15) << p.name;
+      EXPECT_LT(fraction_of_differences(pattern, pattern, kRepeat.width_m, 0), 0.01) << p.name;
+      EXPECT_LT(fraction_of_differences(pattern, pattern, 0, kRepeat.height_m), 0.01) << p.name;
+      EXPECT_GT(fraction_of_differences(pattern, pattern, kRepeat.width_m / 3, 0), 0.15) << p.name;
     }
   }
 }

@@ -9,7 +9,7 @@
 namespace evpose::sim {
 
 double LightSwitching::factor(double t_s) const {
-  // Share of a fade that began at `start`.
+  // Completed fraction of a fade that began at `start`.
   const auto done = [&](double start) {
     if (start < 0) return 0.0;
     return fade_s > 0 ? std::clamp((t_s - start) / fade_s, 0.0, 1.0) : (t_s >= start ? 1.0 : 0.0);
@@ -20,10 +20,11 @@ double LightSwitching::factor(double t_s) const {
 }
 
 double LightSwitching::step_s(double t_s) const {
-  constexpr double kStepsAWave = 16, kStepsAFade = 16;
-  double step = flicker_depth > 0 ? 1 / (kStepsAWave * flicker_hz) : std::numeric_limits<double>::infinity();
+  constexpr double kStepsPerPeriod = 16, kStepsPerFade = 16;
+  double step =
+      flicker_depth > 0 ? 1 / (kStepsPerPeriod * flicker_hz) : std::numeric_limits<double>::infinity();
   for (const double start : {off_at_s, on_at_s}) {
-    if (start >= 0 && t_s >= start && t_s < start + fade_s) step = std::min(step, fade_s / kStepsAFade);
+    if (start >= 0 && t_s >= start && t_s < start + fade_s) step = std::min(step, fade_s / kStepsPerFade);
   }
   return step;
 }

@@ -15,12 +15,12 @@ namespace evpose::sim {
 
 class Texture;
 
-/// What a surface is made of. Surfaces scatter evenly (Lambert) and may shine by themselves.
+/// Optical properties of a surface: Lambertian reflectance and own emission.
 struct Material {
   std::string name;
   double reflectance = 0.5;                ///< 0 to 1; a factor of the texture where there is one
   std::shared_ptr<const Texture> texture;  ///< none: plain
-  double emission_cd_m2 = 0;               ///< own light: sky, lamp, window pane
+  double emission_cd_m2 = 0;               ///< emitted luminance: sky, lamp, window pane
   int emission_light = -1;                 ///< light whose switching and flicker it follows; -1: constant
 };
 
@@ -32,20 +32,20 @@ struct Mesh {
   std::vector<std::array<Eigen::Vector2f, 3>> uv;       ///< of each corner, metres on the texture
   std::vector<std::array<Eigen::Vector3f, 3>> normals;  ///< of each corner, unit, map's or part's frame
   std::vector<std::int32_t> material;                   ///< of each triangle
-  std::vector<std::int32_t> object;  ///< of each triangle: number of the thing it belongs to (Scene::objects)
+  std::vector<std::int32_t> object;  ///< of each triangle: number of its object in Scene::objects
 };
 
-/// How a light changes over time: a factor that is 1 without.
+/// Change of a light over time, as a factor; 1 without any.
 struct LightSwitching {
-  double off_at_s = -1;      ///< from then on `off_factor`; negative: never
+  double off_at_s = -1;      ///< time from which `off_factor` holds; negative: never
   double on_at_s = -1;       ///< on again; negative: never
-  double off_factor = 0;     ///< what is left when off
-  double flicker_hz = 0;     ///< of the light itself: twice the mains
+  double off_factor = 0;     ///< remaining fraction when off
+  double flicker_hz = 0;     ///< of the light: twice the mains frequency
   double flicker_depth = 0;  ///< 0 to 1: factor 1 + depth * sin
   double fade_s = 2e-3;      ///< how long going off or on takes
 
   double factor(double t_s) const;
-  /// Longest time step from `t_s` on, up to the next switch, within which the factor changes evenly, about.
+  /// Longest time step from `t_s` on, up to the next switch, over which the factor is nearly linear.
   double step_s(double t_s) const;
   double next_switch_s(double t_s) const;  ///< after `t_s`; infinite: none
   bool constant() const { return off_at_s < 0 && flicker_depth == 0; }
@@ -59,30 +59,30 @@ struct Light {
   LightKind kind = LightKind::ambient;
   /// sun: lux on a surface that faces it; lamp: candela; ambient: lux on an open surface
   double strength = 0;
-  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< sun: the way its light goes, map frame
+  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< sun: propagation of its light, map frame
   Eigen::Vector3d position = Eigen::Vector3d::Zero();     ///< lamp: metres, map frame
-  double radius = 0.1;    ///< lamp: metres; sun: rad, half its apparent size. Width of half shadows
-  bool daylight = false;  ///< from out of doors: is not switched with the lamps
+  double radius = 0.1;    ///< lamp: metres; sun: rad, half its apparent size. Sets the width of penumbrae
+  bool daylight = false;  ///< from outdoors: not switched with the lamps
   LightSwitching switching;
 };
 
-/// A rigid thing that moves on its own, or one of its limbs.
+/// A rigid body that moves, or one link of an articulated one.
 struct MovingPart {
   std::string name;
   Mesh mesh;                                   ///< in the part's frame
   std::function<Pose(double t_s)> T_map_part;  ///< smooth; called from several threads
 };
 
-/// What the sensors see. Map frame: z up, metres.
+/// The environment of the sensors. Map frame: z up, metres.
 struct Scene {
   std::string name;
-  Mesh mesh;  ///< all that stands still, map frame
+  Mesh mesh;  ///< all static geometry, map frame
   std::vector<Material> materials;
   std::vector<Light> lights;
   std::vector<MovingPart> moving;
-  std::vector<std::string> objects;  ///< names by Mesh::object; moving things have numbers of their own
-  double sky_cd_m2 = 0;              ///< seen where a ray meets nothing
-  Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< of the space that can be flown in
+  std::vector<std::string> objects;  ///< names by Mesh::object; every moving object has its own number
+  double sky_cd_m2 = 0;              ///< luminance where a ray hits nothing
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< lower corner of the free space
   Eigen::Vector3d high = Eigen::Vector3d::Zero();
 };
 

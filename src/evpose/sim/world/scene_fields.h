@@ -11,8 +11,8 @@
 
 namespace evpose::sim {
 
-/// Reads the members of a YAML map and keeps the first thing that is wrong: values read after that are the
-/// defaults. `finish` tells what was wrong, or which member nobody asked for.
+/// Reads the members of a YAML map and keeps the first error; values read after it are the defaults. `finish`
+/// returns that error, or the first unknown member.
 class SceneFields {
  public:
   /// `what` names the map in messages.
@@ -36,7 +36,7 @@ class SceneFields {
   Pose pose();
   /// A member of any kind, or nullptr.
   const YamlNode* member(const std::string& key);
-  /// The one of the names that is there.
+  /// The one of the names that is present.
   std::string needed_one_of(const std::vector<std::string>& keys);
 
   void fail(const YamlNode& node, const std::string& what, const std::string& fix);

@@ -14,19 +14,19 @@
 #include "evpose/sim/world/closed_path.h"
 #include "evpose/sim/world/mesh_file.h"
 #include "evpose/sim/world/scene_fields.h"
-#include "evpose/sim/world/world_draft.h"
+#include "evpose/sim/world/world_builder.h"
 
 namespace evpose::sim {
 namespace {
 
 constexpr double kLongest_m = 1000;
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kMostTexels = 5e7;  // 130 MB with its smaller scales
+constexpr double kMostTexels = 5e7;  // 130 MB with its mipmap
 
 class SceneReader {
  public:
   SceneReader(const YamlDocument& document, const WorldConfig& world)
-      : document_(document), world_(world), draft_(world_) {}
+      : document_(document), world_(world), builder_(world_) {}
 
   Expected<Scene> read(ThreadPool& pool) {
     SceneFields top(document_, document_.root, "scene");
@@ -34,8 +34,8 @@ class SceneReader {
     if (base != nullptr) {
       if (auto status = read_base(*base); !status) return status.error();
     }
-    draft_.scene.name = top.string("name", base != nullptr ? draft_.scene.name : "scene");
-    draft_.scene.sky_cd_m2 = top.number("sky_cd_m2", draft_.scene.sky_cd_m2, {0, 1e6});
+    builder_.scene.name = top.string("name", base != nullptr ? builder_.scene.name : "scene");
+    builder_.scene.sky_cd_m2 = top.number("sky_cd_m2", builder_.scene.sky_cd_m2, {0, 1e6});
     const double contrast = top.number("texture_contrast", world_.texture_contrast, {0, 3});
     const YamlNode* const space = top.member("free_space");
     using Reader = Status (SceneReader::*)(const YamlNode&);
@@ -54,13 +54,12 @@ class SceneReader {
     }
     if (auto status = top.finish(); !status) return status.error();
     if (auto status = read_space(space, base != nullptr); !status) return status.error();
-    if (draft_.scene.mesh.triangles.empty())
-      return document_.error(document_.root, "the scene has nothing that stands still",
-                             "add `base` or `objects`");
-    if (draft_.scene.lights.empty())
+    if (builder_.scene.mesh.triangles.empty())
+      return document_.error(document_.root, "the scene has no static object", "add `base` or `objects`");
+    if (builder_.scene.lights.empty())
       return document_.error(document_.root, "the scene has no light", "add `lights`");
-    draft_.scene.materials = draft_.materials.take(contrast, pool);
-    return std::move(draft_.scene);
+    builder_.scene.materials = builder_.materials.build(contrast, pool);
+    return std::move(builder_.scene);
   }
 
  private:
@@ -68,7 +67,7 @@ class SceneReader {
     ConfigTable table;
     describe(table, world_);
     if (auto status = set_all(table, node, ""); !status) return status;
-    return lay_out_world(draft_);
+    return build_world(builder_);
   }
   Status set_all(ConfigTable& table, const YamlNode& node, const std::string& prefix) const {
     if (node.kind != YamlNode::Kind::map)
@@ -83,7 +82,7 @@ class SceneReader {
   }
 
   Status read_space(const YamlNode* node, bool has_base) {
-    Scene& scene = draft_.scene;
+    Scene& scene = builder_.scene;
     if (node != nullptr) {
       SceneFields fields(document_, *node, "free_space");
       scene.low = fields.needed_vector("low");
@@ -116,7 +115,7 @@ class SceneReader {
       light.radius = f.number("radius_rad", 4.65e-3, {0, 0.5});
       light.daylight = true;
       if (light.direction.norm() < 1e-6)
-        f.fail(node, "direction: has no length", "give the way its light goes, e.g. [0.3, 0.2, -1]");
+        f.fail(node, "direction: has no length", "give the direction of its light, e.g. [0.3, 0.2, -1]");
       light.direction.normalize();
     } else if (kind == "ambient") {
       light.strength = f.needed_number("lux", {0, 2e5});
@@ -125,7 +124,7 @@ class SceneReader {
     }
     light.daylight = f.boolean("daylight", light.daylight);
     if (auto status = f.finish(); !status) return status;
-    draft_.scene.lights.push_back(light);
+    builder_.scene.lights.push_back(light);
     return {};
   }
 
@@ -149,19 +148,19 @@ class SceneReader {
       if (!f.failed() && !made)
         f.fail(node, "pattern: '" + pattern + "' is unknown",
                "did you mean '" + nearest_word(pattern, pattern_names()) + "'?");
-      material = draft_.materials.add_textured(name, tone, repeat, texel, std::move(made));
+      material = builder_.materials.add_textured(name, tone, repeat, texel, std::move(made));
     } else {
-      material = draft_.materials.add_plain(name, f.number("reflectance", 0.5, {0, 1}));
+      material = builder_.materials.add_plain(name, f.number("reflectance", 0.5, {0, 1}));
     }
-    if (glow > 0) draft_.materials.make_glow(material, glow, light_number(f, node, light));
+    if (glow > 0) builder_.materials.set_emission(material, glow, light_number(f, node, light));
     if (materials_.count(name) != 0) f.fail(node, "material: '" + name + "' stands here twice", "rename one");
     materials_[name] = material;
     return f.finish();
   }
   int light_number(SceneFields& f, const YamlNode& node, const std::string& name) const {
     if (name.empty()) return -1;
-    for (std::size_t i = 0; i < draft_.scene.lights.size(); ++i)
-      if (draft_.scene.lights[i].name == name) return static_cast<int>(i);
+    for (std::size_t i = 0; i < builder_.scene.lights.size(); ++i)
+      if (builder_.scene.lights[i].name == name) return static_cast<int>(i);
     f.fail(node, "emission_light: there is no light '" + name + "'", "name one of `lights`");
     return -1;
   }
@@ -226,23 +225,23 @@ class SceneReader {
     options.y_up = up == "y";
     options.finish = covering;
     if (auto status = f.finish(); !status) return status.error();
-    // Relative to the scene's file.
+    // Relative to the file of the scene.
     return read_mesh((std::filesystem::path(document_.path).parent_path() / file).string(), options);
   }
 
   Status read_object(const YamlNode& node) {
     SceneFields f(document_, node, "object");
-    const std::int32_t object = draft_.add_object(f.string("name", "object"));
+    const std::int32_t object = builder_.add_object(f.string("name", "object"));
     const Pose T_map_body = f.pose();
     const auto body = read_body(f, finish(f, object));
     if (auto status = f.finish(); !status) return status;
     if (!body) return body.error();
-    add_mesh(draft_.scene.mesh, *body, T_map_body);
+    add_mesh(builder_.scene.mesh, *body, T_map_body);
     return {};
   }
 
   const MoverMaterials& mover_materials() {
-    if (!movers_) movers_ = add_mover_materials(draft_.materials, draft_.seed(), 0.004);
+    if (!movers_) movers_ = add_mover_materials(builder_.materials, builder_.seed(), 0.004);
     return *movers_;
   }
 
@@ -259,7 +258,7 @@ class SceneReader {
       fan.rpm = f.number("rpm", fan.rpm, {-60000, 60000});
       fan.stand_to_z = f.number("stand_to_z", fan.stand_to_z, {-1e9, 1e5});
       status = f.finish();
-      if (status) add_fan(draft_.scene, mover_materials(), fan);
+      if (status) add_fan(builder_.scene, mover_materials(), fan);
     } else if (kind == "person") {
       Walker person;
       person.name = name;
@@ -269,7 +268,7 @@ class SceneReader {
       person.height_m = f.number("height_m", person.height_m, {0.3, 3});
       person.clothes = static_cast<int>(f.number("look", 0, {0, 1000}));
       status = f.finish();
-      if (status) add_walker(draft_.scene, mover_materials(), person);
+      if (status) add_walker(builder_.scene, mover_materials(), person);
     } else if (kind == "car") {
       Car car;
       car.name = name;
@@ -278,7 +277,7 @@ class SceneReader {
       car.start_m = f.number("start_m", 0, {-1e6, 1e6});
       car.paint = static_cast<int>(f.number("look", 0, {0, 1000}));
       status = f.finish();
-      if (status) add_car(draft_.scene, mover_materials(), car);
+      if (status) add_car(builder_.scene, mover_materials(), car);
     } else if (kind == "thing") {
       status = read_moving_thing(f, name);
     } else {
@@ -288,9 +287,9 @@ class SceneReader {
     return status;
   }
 
-  // An own body that goes along a path, turns about an axis, or both.
+  // A custom body that moves along a path, rotates about an axis, or both.
   Status read_moving_thing(SceneFields& f, const std::string& name) {
-    const std::int32_t object = draft_.add_object(name);
+    const std::int32_t object = builder_.add_object(name);
     const Pose T_way_body = f.pose();
     const Eigen::Vector3d axis = f.vector("spin_axis", {0, 0, 1});
     const double rate = f.number("spin_rpm", 0, {-60000, 60000}) / 60 * kTurn;
@@ -306,7 +305,7 @@ class SceneReader {
     if (auto status = f.finish(); !status) return status;
     if (!body) return body.error();
     const Eigen::Vector3d spin = rate * axis.normalized();
-    draft_.scene.moving.push_back(
+    builder_.scene.moving.push_back(
         {name, *std::move(body), [=](double t_s) {
            Pose T_map_way;
            if (path) {
@@ -321,7 +320,7 @@ class SceneReader {
 
   const YamlDocument& document_;
   WorldConfig world_;
-  WorldDraft draft_;
+  WorldBuilder builder_;
   std::map<std::string, std::int32_t> materials_;
   std::optional<MoverMaterials> movers_;
 };

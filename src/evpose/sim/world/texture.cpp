@@ -10,8 +10,8 @@ namespace evpose::sim {
 namespace {
 
 constexpr float kWhite = 65535;
-/// A surface seen at a grazing angle is averaged by so many steps along the footprint at most; beyond, it
-/// gets softer across too.
+/// Largest number of samples along the footprint at a grazing angle. Beyond it the footprint is widened
+/// across.
 constexpr int kMostTaps = 8;
 
 int wrapped(int i, int n) { return i >= n ? i - n : i; }
@@ -39,7 +39,7 @@ Texture::Texture(double width_m, double height_m, double texel_m, const Pattern&
     const Level& fine = levels_.back();
     Level coarse{(fine.columns + 1) / 2, (fine.rows + 1) / 2, {}};
     coarse.values.reserve(static_cast<std::size_t>(coarse.columns) * coarse.rows);
-    // Halving a length that is odd would shift the picture: take the mean over the exact span instead.
+    // Halving an odd length would shift the texture, hence the mean over the exact span.
     const double ratio_u = static_cast<double>(fine.columns) / coarse.columns,
                  ratio_v = static_cast<double>(fine.rows) / coarse.rows;
     const auto spans = [](int i, double ratio, int n, int* first, double* weights) {
@@ -71,7 +71,7 @@ Texture::Texture(double width_m, double height_m, double texel_m, const Pattern&
   }
 }
 
-// Bilinear; (u, v) in shares of the rectangle, in [0, 1).
+// Bilinear; (u, v) as fractions of the rectangle, in [0, 1).
 float Texture::sample(const Level& level, float u, float v) const {
   const auto columns = static_cast<float>(level.columns), rows = static_cast<float>(level.rows);
   float x = u * columns - 0.5f, y = v * rows - 0.5f;
@@ -103,7 +103,8 @@ float Texture::mean(float u_m, float v_m, const Eigen::Vector2f& a_m, const Eige
     taps = std::min(kMostTaps, static_cast<int>(std::ceil(major / across)));
     across = std::max(across, major / static_cast<float>(taps));
   }
-  // Level and share of the next one: a footprint of 2^k (1 + f) texels is that share f on from level k.
+  // Mipmap level and weight of the next one: a footprint of 2^k (1 + f) texels blends f of level k + 1 into
+  // k.
   int exponent = 0;
   const float mantissa = 2 * std::frexp(across / texel_, &exponent);
   const int last = static_cast<int>(levels_.size()) - 1;

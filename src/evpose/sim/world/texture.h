@@ -9,12 +9,12 @@
 
 namespace evpose::sim {
 
-/// Reflectance over a rectangle that repeats itself in both directions, kept at all scales, so that a pixel
-/// takes its mean over what it sees, however coarse or slanted, and nothing twinkles.
+/// Reflectance over a rectangle that repeats in both directions, as a mipmap with anisotropic filtering: a
+/// pixel gets the mean over its footprint, without aliasing.
 class Texture {
  public:
-  /// The pattern from (0, 0) to (width, height), sampled once per texel. A pattern that does not close at the
-  /// borders has a seam there, unseen where the surface is not larger than the rectangle.
+  /// The pattern from (0, 0) to (width, height), sampled once per texel. A pattern that is not periodic has
+  /// a seam at the borders, which is invisible on surfaces no larger than the rectangle.
   Texture(double width_m, double height_m, double texel_m, const Pattern& pattern);
 
   /// Mean around (u, v), metres, over the parallelogram spanned by `a` and `b`, metres.

@@ -19,7 +19,7 @@ constexpr unsigned kOnGround = all_sides & ~static_cast<unsigned>(side_below);
 
 class Street {
  public:
-  explicit Street(WorldDraft& draft) : d_(draft) {}
+  explicit Street(WorldBuilder& builder) : d_(builder) {}
 
   void lay_out() {
     m_ = add_outdoor_materials(d_, 0.006);
@@ -38,8 +38,8 @@ class Street {
 
  private:
   // Things on a side of the street: `side` 1 is +y. Faces the road.
-  static Place facing_road(double x, double y, double z, double side) {
-    return Place(V(x, side * y, z), side > 0 ? 0 : kHalfTurn);
+  static Placement facing_road(double x, double y, double z, double side) {
+    return Placement(V(x, side * y, z), side > 0 ? 0 : kHalfTurn);
   }
 
   void add_ground() {
@@ -97,7 +97,7 @@ class Street {
   void shop(double side, double x, double width, double front) {
     if (!d_.chance(0.6)) return;
     const std::int32_t object = d_.add_object("shop");
-    const Place place = facing_road(x + d_.random.uniform(0.3, 0.7) * width, front, kPavement, side);
+    const Placement place = facing_road(x + d_.random.uniform(0.3, 0.7) * width, front, kPavement, side);
     put_box(d_, place, V(-1.2, -0.14, 2.45), V(1.2, 0, 2.75), d_.finish(m_.container, object),
             all_sides & ~static_cast<unsigned>(side_north));
     if (d_.chance(0.5))
@@ -107,18 +107,18 @@ class Street {
   void add_pavement_things(double side) {
     for (double x = 3; x < kLength; x += 4.5) {
       const double at = x + d_.random.uniform(-0.8, 0.8), pick = d_.random.uniform();
-      const Place near_kerb = facing_road(at, 4.75, kPavement, side),
-                  near_wall = facing_road(at, 6.4, kPavement, side);
+      const Placement near_kerb = facing_road(at, 4.75, kPavement, side),
+                      near_wall = facing_road(at, 6.4, kPavement, side);
       if (pick < 0.2) {
         put_bench(d_, furniture_, near_wall, 1.5);
       } else if (pick < 0.4) {
         put_cartons(d_, furniture_, near_wall, d_.random.uniform(0.5, 0.8), 1.2);
       } else if (pick < 0.55) {
         const std::int32_t object = d_.add_object("bin");
-        put_post(d_, near_kerb.T_map_thing.p, {0.24, 0.85, 28}, d_.finish(m_.container, object));
+        put_post(d_, near_kerb.T_map_object.p, {0.24, 0.85, 28}, d_.finish(m_.container, object));
       } else if (pick < 0.75) {
         for (int i = 0; i < 4; ++i)
-          put_post(d_, near_kerb.T_map_thing * V(0.7 * i - 1, 0, 0), {0.07, 0.8, 20},
+          put_post(d_, near_kerb.T_map_object * V(0.7 * i - 1, 0, 0), {0.07, 0.8, 20},
                    d_.finish(m_.pole, d_.add_object("bollard")));
       } else if (pick < 0.9) {
         const std::int32_t object = d_.add_object("planter");
@@ -148,9 +148,9 @@ class Street {
     f.width = 28;
     f.height = 14;
     f.wall = m_.walls[1];
-    put_facade(d_, m_, Place(V(kLength + 25, 0, 0), -0.5 * kHalfTurn), f);
+    put_facade(d_, m_, Placement(V(kLength + 25, 0, 0), -0.5 * kHalfTurn), f);
     f.wall = m_.walls[0];
-    put_facade(d_, m_, Place(V(-25, 0, 0), 0.5 * kHalfTurn), f);
+    put_facade(d_, m_, Placement(V(-25, 0, 0), 0.5 * kHalfTurn), f);
   }
 
   void add_moving_things() {
@@ -198,7 +198,7 @@ class Street {
     return points;
   }
 
-  WorldDraft& d_;
+  WorldBuilder& d_;
   OutdoorMaterials m_;
   FurnitureMaterials furniture_;
   MoverMaterials movers_;
@@ -206,7 +206,7 @@ class Street {
 
 }  // namespace
 
-void lay_out_canyon(WorldDraft& d) {
+void build_canyon(WorldBuilder& d) {
   d.scene.name = "canyon";
   d.scene.low = {3, -1.9, 0.8};
   d.scene.high = {97, 1.9, 6};

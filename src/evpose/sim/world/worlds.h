@@ -24,9 +24,10 @@ struct WorldConfig {
   WorldKind kind = WorldKind::hall;
   int seed = 1;                 ///< arrangement, textures and tones
   double texture_contrast = 1;  ///< factor on the contrasts of all textures
-  double lamp_lux = 400;       ///< hall: in its middle at table height; outside: under a street lamp at night
-  double window_cd_m2 = 2500;  ///< hall: the sky outside
-  double sun_lux = 60000;      ///< outside, facing it
+  double lamp_lux =
+      400;  ///< hall: in its middle at table height; outside at night: 20 times that below a street lamp
+  double window_cd_m2 = 2500;    ///< hall: the sky outside
+  double sun_lux = 60000;        ///< outside, facing it
   double sun_azimuth_deg = 215;  ///< from +x to +y
   double sun_elevation_deg = 48;
   double sky_lux = 15000;  ///< outside, on open ground
@@ -35,9 +36,9 @@ struct WorldConfig {
 };
 void describe(ConfigTable& table, WorldConfig& config);
 
-/// The world, with its moving things. The same for any number of threads. Scene::low and high bound a space
-/// that nothing stands in: over the whole height for hall and canyon, above a cone of 45 degrees from the
-/// pad's rim in the courtyard. Errors: moving things that the world has no room for.
+/// The world with its moving objects. The same for any number of threads. Scene::low and high bound the free
+/// space: over the whole height for hall and canyon, above a cone of 45 degrees from the rim of the pad in
+/// the courtyard. Errors: moving objects for which the world has no room.
 Expected<Scene> make_world(const WorldConfig& config, ThreadPool& pool);
 
 }  // namespace evpose::sim

@@ -10,7 +10,7 @@
 #include "evpose/core/parallel.h"
 #include "evpose/sim/world/mesh_builder.h"
 #include "evpose/sim/world/texture.h"
-#include "evpose/sim/world/world_draft.h"
+#include "evpose/sim/world/world_builder.h"
 
 namespace evpose::sim {
 namespace {
@@ -23,9 +23,9 @@ Scene layout(WorldKind kind, int seed, int movers = 0) {
   config.kind = kind;
   config.seed = seed;
   config.movers.fans = config.movers.people = movers;
-  WorldDraft draft(config);
-  EXPECT_TRUE(lay_out_world(draft).ok());
-  return std::move(draft.scene);
+  WorldBuilder builder(config);
+  EXPECT_TRUE(build_world(builder).ok());
+  return std::move(builder.scene);
 }
 
 TEST(Worlds, AreTheSameForASeedAndArrangedAnewByAnother) {
@@ -65,12 +65,12 @@ TEST(Worlds, LampsGiveTheLightThatIsAskedFor) {
   WorldConfig config;
   config.lamp_lux = 350;
   config.window_cd_m2 = 0;
-  WorldDraft draft(config);
-  ASSERT_TRUE(lay_out_world(draft).ok());
+  WorldBuilder builder(config);
+  ASSERT_TRUE(build_world(builder).ok());
   double fill = 0;
-  for (const Light& light : draft.scene.lights)
+  for (const Light& light : builder.scene.lights)
     if (light.kind == LightKind::ambient) fill += light.strength;
-  EXPECT_NEAR(lamp_lux_at(draft.scene, {4, 3, 0.75}) + fill, 350, 1);
+  EXPECT_NEAR(lamp_lux_at(builder.scene, {4, 3, 0.75}) + fill, 350, 1);
 }
 
 TEST(Worlds, MaterialsReflectPlausibly) {
@@ -108,9 +108,9 @@ TEST(Worlds, NightIsMillionsOfTimesDarkerThanDay) {
   day.kind = night.kind = WorldKind::courtyard;
   night.night = true;
   night.lamp_lux = 0;
-  WorldDraft bright(day), dark(night);
-  ASSERT_TRUE(lay_out_world(bright).ok());
-  ASSERT_TRUE(lay_out_world(dark).ok());
+  WorldBuilder bright(day), dark(night);
+  ASSERT_TRUE(build_world(bright).ok());
+  ASSERT_TRUE(build_world(dark).ok());
   double in_sun = 0, at_night = 0;
   for (const Light& light : bright.scene.lights) in_sun += light.strength;
   for (const Light& light : dark.scene.lights) at_night += light.kind == LightKind::lamp ? 0 : light.strength;

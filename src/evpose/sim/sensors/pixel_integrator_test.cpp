@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/sim/sensors/film.h"
+#include "evpose/sim/sensors/pixel_integrator.h"
 
 #include <gtest/gtest.h>
 
@@ -19,37 +19,37 @@ EventCameraConfig ideal_pixels() {
   EventCameraConfig config;
   config.threshold_sigma = config.refractory_us = config.bandwidth_hz_per_cd_m2 = 0;
   config.dark_cd_m2 = 1e-9;
-  config.leak_hz = config.shot_noise_dark_hz = config.shot_noise_bright_hz = config.hot_share = 0;
-  config.start_spread = 0;
+  config.leak_hz = config.shot_noise_dark_hz = config.shot_noise_bright_hz = config.hot_pixel_fraction = 0;
+  config.reference_spread = 0;
   return config;
 }
 
-// A film of a scene, from a camera that moves evenly without turning.
+// Integrates a scene seen from a camera that moves uniformly without rotation.
 struct Shot {
   Shot(const Scene& of, const Eigen::Vector3d& from, const Eigen::Vector3d& by)
       : scene(of), start(from), velocity(by) {
-    film.veiling_glare = 0;
+    integrator.veiling_glare = 0;
   }
 
   Scene scene;
   Eigen::Vector3d start, velocity;
   std::shared_ptr<const Camera> camera = test_camera(64, 48, kFocal);
   EventCameraConfig pixels = ideal_pixels();
-  FilmConfig film;
+  PixelIntegratorConfig integrator;
   double duration_s = 0.05;
   int threads = 1;
   std::vector<Exposure*> exposures;
 
   std::vector<SimEvent> shoot() const {
     ThreadPool pool(threads);
-    const Stage stage(scene, pool);
+    const PreparedScene prepared(scene, pool);
     const auto rays = pixel_rays(*camera);
     EventPixels event_pixels(camera->size(), pixels, 1);
     const auto path = [&](double t_s) {
       const Pose pose = looking_along_x(start + t_s * velocity);
       return CameraMotion{pose, pose.q.conjugate() * velocity, Eigen::Vector3d::Zero()};
     };
-    Film one(stage, *camera, *rays, path, film, event_pixels, pool);
+    PixelIntegrator one(prepared, *camera, *rays, path, integrator, event_pixels, pool);
     one.start(0);
     std::vector<SimEvent> events;
     const TimeNs end = from_seconds(duration_s);
@@ -67,7 +67,7 @@ ByPixel by_pixel(const std::vector<SimEvent>& events) {
 }
 
 // An upright edge at y = 0, 2 m ahead, passes the camera at 0.9 m/s: 90 px/s. Every pixel that it crosses
-// whole must fire floor(ln(contrast) / threshold) times, when the share of the new side makes it.
+// whole must fire floor(ln(contrast) / threshold) times, when the area of the new side reaches it.
 void expect_theory(const Scene& scene, double left, double right) {
   Shot shot(scene, {0, -0.015, 0}, {0, 0.9, 0});
   const ByPixel events = by_pixel(shot.shoot());
@@ -88,9 +88,9 @@ void expect_theory(const Scene& scene, double left, double right) {
       for (int k = 0; k < wanted; ++k) {
         // The left side takes the place of the right.
         const double sign = left > right ? 1 : -1;
-        const double share = (right * std::exp(sign * 0.25 * (k + 1)) - right) / (left - right);
+        const double fraction = (right * std::exp(sign * 0.25 * (k + 1)) - right) / (left - right);
         EXPECT_EQ(at->second[k].on, left > right);
-        EXPECT_NEAR(to_seconds(at->second[k].t), enters + share / px_per_s, 20e-6)
+        EXPECT_NEAR(to_seconds(at->second[k].t), enters + fraction / px_per_s, 20e-6)
             << x << " " << y << " " << k;
       }
     }
@@ -98,14 +98,14 @@ void expect_theory(const Scene& scene, double left, double right) {
   EXPECT_GT(pixels, 100);
 }
 
-TEST(Film, PrintedStepEdgeFiresWhenTheorySays) {
+TEST(PixelIntegrator, PrintedStepEdgeFiresWhenTheorySays) {
   TestScene plain;
   plain.add({2, 0, -1}, {0, 0, 2}, {0, 1, 0}, 0.6);
   plain.add({2, -1, -1}, {0, 0, 2}, {0, 1, 0}, 0.1);
   expect_theory(plain.scene, 0.6, 0.1);
 }
 
-TEST(Film, OutlineBeforeAFarWallFiresWhenTheorySays) {
+TEST(PixelIntegrator, OutlineBeforeAFarWallFiresWhenTheorySays) {
   TestScene plain;
   plain.add({2, 0, -1}, {0, 0, 2}, {0, 1, 0}, 0.08);
   plain.add({4, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.5);
@@ -113,7 +113,7 @@ TEST(Film, OutlineBeforeAFarWallFiresWhenTheorySays) {
 }
 
 // Both edges of a dark bar of 1.3 pixels give as many events as go back again.
-TEST(Film, ThinBarComesAndGoes) {
+TEST(PixelIntegrator, ThinBarComesAndGoes) {
   TestScene plain;
   plain.add({2, 0, -1}, {0, 0, 2}, {0, 0.013, 0}, 0.1);
   plain.add({4, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.5);
@@ -132,7 +132,7 @@ TEST(Film, ThinBarComesAndGoes) {
   EXPECT_GT(pixels, 100);
 }
 
-TEST(Film, NothingMovesNothingFires) {
+TEST(PixelIntegrator, NothingMovesNothingFires) {
   TestScene plain;
   plain.add({2, 0, -1}, {0, 0, 2}, {0, 1, 0}, 0.6);
   plain.add({4, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.5);
@@ -140,7 +140,7 @@ TEST(Film, NothingMovesNothingFires) {
   EXPECT_TRUE(shot.shoot().empty());
 }
 
-TEST(Film, ThreadsDoNotMatter) {
+TEST(PixelIntegrator, ThreadsDoNotMatter) {
   TestScene plain;
   plain.add({2, 0, -1}, {0, 0, 2}, {0, 1, 0}, 0.6);
   plain.add({4, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.2);
@@ -162,9 +162,9 @@ TEST(Film, ThreadsDoNotMatter) {
   }
 }
 
-// A picture is the mean of luminance over its exposure: where an edge passes, the share of time that each
+// A frame is the mean of luminance over its exposure: where an edge passes, the fraction of time that each
 // side was seen.
-TEST(Film, FrameIsTheMeanOfItsExposure) {
+TEST(PixelIntegrator, FrameIsTheMeanOfItsExposure) {
   TestScene plain;
   plain.add({2, 0, -1}, {0, 0, 2}, {0, 1, 0}, 0.6);
   plain.add({2, -1, -1}, {0, 0, 2}, {0, 1, 0}, 0.1);
@@ -183,7 +183,7 @@ TEST(Film, FrameIsTheMeanOfItsExposure) {
   }
 }
 
-TEST(Film, LightsOffIsSeenByAll) {
+TEST(PixelIntegrator, LightsOffIsSeenByAll) {
   TestScene plain;
   plain.add({2, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.5);
   plain.scene.lights[0].switching.off_at_s = 0.0203;

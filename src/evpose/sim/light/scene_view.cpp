@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/sim/light/view.h"
+#include "evpose/sim/light/scene_view.h"
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostChannels = 16;
 
-// Illuminance by channel, times the channels' factors.
+// Illuminance of the light map, each channel weighted by its factor.
 float baked_light(const LightMap& map, const std::vector<float>& factors, float right, float up) {
   const auto per_metre = static_cast<float>(map.per_metre);
   const float x = std::clamp(right * per_metre, 0.0F, static_cast<float>(map.columns - 1));
@@ -34,14 +34,14 @@ float baked_light(const LightMap& map, const std::vector<float>& factors, float 
   return sum;
 }
 
-float moving_light(const Stage& stage, const View& view, const PatchView& patch,
+float moving_light(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
                    const Eigen::Vector3f& ray_cam, float depth) {
   std::array<float, kMostChannels> by_channel{};
   const Eigen::Vector3d point = view.T_map_cam * (depth * ray_cam).cast<double>();
   Eigen::Vector3d normal = view.T_map_part[patch.part].q * patch.patch->normal;
   // Both sides of a blade are lit.
   if (normal.dot(view.R_map_cam * ray_cam.cast<double>()) > 0) normal = -normal;
-  open_light(stage.scene, stage.channels, point, normal, by_channel.data());
+  unoccluded_light(prepared.scene, prepared.channels, point, normal, by_channel.data());
   float sum = 0;
   for (std::size_t i = 0; i < view.light.size(); ++i) sum += view.light[i] * by_channel[i];
   return sum;
@@ -49,31 +49,31 @@ float moving_light(const Stage& stage, const View& view, const PatchView& patch,
 
 }  // namespace
 
-View make_view(const Stage& stage, double t_s, const Pose& T_map_cam) {
-  EVPOSE_CHECK(stage.channels.switching.size() <= kMostChannels);
-  View view{t_s, T_map_cam, T_map_cam.rotation(), stage.channels.factors(t_s), {}, {}};
-  for (const MovingPart& part : stage.scene.moving) {
+SceneView make_scene_view(const PreparedScene& prepared, double t_s, const Pose& T_map_cam) {
+  EVPOSE_CHECK(prepared.channels.switching.size() <= kMostChannels);
+  SceneView view{t_s, T_map_cam, T_map_cam.rotation(), prepared.channels.factors(t_s), {}, {}};
+  for (const MovingPart& part : prepared.scene.moving) {
     view.T_map_part.push_back(part.T_map_part(t_s));
     view.T_part_cam.push_back(view.T_map_part.back().inverse() * T_map_cam);
   }
   return view;
 }
 
-View between(const View& a, const View& b, double share) {
-  View view;
-  view.t_s = a.t_s + share * (b.t_s - a.t_s);
-  view.T_map_cam = interpolate(a.T_map_cam, b.T_map_cam, share);
+SceneView interpolate_view(const SceneView& a, const SceneView& b, double fraction) {
+  SceneView view;
+  view.t_s = a.t_s + fraction * (b.t_s - a.t_s);
+  view.T_map_cam = interpolate(a.T_map_cam, b.T_map_cam, fraction);
   view.R_map_cam = view.T_map_cam.rotation();
   for (std::size_t i = 0; i < a.light.size(); ++i)
-    view.light.push_back(a.light[i] + static_cast<float>(share) * (b.light[i] - a.light[i]));
+    view.light.push_back(a.light[i] + static_cast<float>(fraction) * (b.light[i] - a.light[i]));
   for (std::size_t i = 0; i < a.T_map_part.size(); ++i) {
-    view.T_map_part.push_back(interpolate(a.T_map_part[i], b.T_map_part[i], share));
+    view.T_map_part.push_back(interpolate(a.T_map_part[i], b.T_map_part[i], fraction));
     view.T_part_cam.push_back(view.T_map_part.back().inverse() * view.T_map_cam);
   }
   return view;
 }
 
-PatchView view_patch(const View& view, const Patch& patch, int part) {
+PatchView make_patch_view(const SceneView& view, const Patch& patch, int part) {
   const Eigen::Vector3d origin = part < 0 ? view.T_map_cam.p : view.T_part_cam[part].p;
   const Eigen::Matrix3d R = (part < 0 ? view.R_map_cam : view.T_part_cam[part].rotation()).transpose();
   PatchView out;
@@ -94,11 +94,11 @@ PatchView view_patch(const View& view, const Patch& patch, int part) {
   return out;
 }
 
-float luminance(const Stage& stage, const View& view, const PatchView& patch, const PixelRay& ray, float x,
-                float y) {
+float luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+                const PixelRay& ray, float x, float y) {
   const Eigen::Vector3f r = ray.direction(x, y);
   const float inverse = 1 / patch.normal.dot(r), depth = patch.reach * inverse;
-  const Material& material = stage.scene.materials[patch.patch->material];
+  const Material& material = prepared.scene.materials[patch.patch->material];
   auto reflectance = static_cast<float>(material.reflectance);
   if (material.texture) {
     const float along_u = patch.u_axis.dot(r), along_v = patch.v_axis.dot(r);
@@ -113,10 +113,10 @@ float luminance(const Stage& stage, const View& view, const PatchView& patch, co
   const LightMap& map = patch.patch->light;
   const float lux = map.columns > 0 ? baked_light(map, view.light, patch.right0 + depth * patch.right.dot(r),
                                                   patch.up0 + depth * patch.up.dot(r))
-                                    : moving_light(stage, view, patch, r, depth);
+                                    : moving_light(prepared, view, patch, r, depth);
   auto emission = static_cast<float>(material.emission_cd_m2);
   if (emission > 0 && material.emission_light >= 0)
-    emission *= view.light[stage.channels.of_light[material.emission_light]];
+    emission *= view.light[prepared.channels.of_light[material.emission_light]];
   return reflectance * lux * std::numbers::inv_pi_v<float> + emission;
 }
 

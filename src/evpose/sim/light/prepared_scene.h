@@ -9,10 +9,10 @@
 
 namespace evpose::sim {
 
-/// A scene made ready to be looked at: rays, patches, baked light.
-struct Stage {
+/// A scene prepared for rendering: ray caster, patches, baked light.
+struct PreparedScene {
   /// Keeps a reference to the scene.
-  Stage(const Scene& of, ThreadPool& pool);
+  PreparedScene(const Scene& of, ThreadPool& pool);
 
   const PartSurfaces& surfaces_of(int part) const { return part < 0 ? still : moving[part]; }
   const Mesh& mesh_of(int part) const { return part < 0 ? scene.mesh : scene.moving[part].mesh; }

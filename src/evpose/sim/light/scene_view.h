@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "evpose/sim/light/pixel_rays.h"
+#include "evpose/sim/light/prepared_scene.h"
+
+namespace evpose::sim {
+
+/// A prepared scene at one instant, seen from one pose.
+struct SceneView {
+  double t_s = 0;
+  Pose T_map_cam;
+  Eigen::Matrix3d R_map_cam;
+  std::vector<float> light;      ///< factor of each light channel
+  std::vector<Pose> T_part_cam;  ///< of each moving part
+  std::vector<Pose> T_map_part;
+};
+SceneView make_scene_view(const PreparedScene& prepared, double t_s, const Pose& T_map_cam);
+/// Interpolates two views that are less than a pixel apart; fraction 0 is `a`.
+SceneView interpolate_view(const SceneView& a, const SceneView& b, double fraction);
+
+/// A patch in the camera frame of one view: along ray r = (x, y, 1) the depth is reach / (normal . r), and a
+/// texture coordinate is its value at the camera plus depth * (axis . r).
+struct PatchView {
+  const Patch* patch = nullptr;
+  int part = -1;
+  Eigen::Vector3f normal, u_axis, v_axis, right, up;
+  float reach = 0, u = 0, v = 0, right0 = 0, up0 = 0;
+};
+PatchView make_patch_view(const SceneView& view, const Patch& patch, int part);
+
+/// Mean luminance over the area of the pixel of `ray`, around its point (x, y), cd/m^2.
+float luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+                const PixelRay& ray, float x = 0, float y = 0);
+
+}  // namespace evpose::sim

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Holds the links of the documentation: links.py ROOT
 
-Every relative link of a Markdown page leads to a file, and its anchor to a heading. Every path below docs/ that a
-source names exists. Every `design.md N.M` that a source cites is a heading of docs/design.md. Prints one line per
-fault; exit status 1 if there is one.
+Every relative link of a Markdown page leads to a file, and its anchor to a heading; every path of the tree that a page
+names exists, but in the first paragraph of a results page, which tells of an earlier commit. Every path below docs/
+that a source names exists. Every `design.md N.M` that a source cites is a heading of docs/design.md. Prints one line
+per fault; exit status 1 if there is one.
 """
 import pathlib
 import re
@@ -17,6 +18,8 @@ NAMED = re.compile(r"\bdocs/[A-Za-z0-9_/.-]+\.(?:md|svg|png)\b")
 CITED = re.compile(r"\bdesign(?:\.md)?,? (?:section )?(\d+(?:\.\d+)?)((?:(?:,| and| to) \d+\.\d+)*)")
 SOURCES = {".h", ".cpp", ".py", ".sh", ".cmake", ".txt", ".in", ".launch", ".yaml", ".js", ".html"}
 FOLDERS = ["apps", "benchmarks", "cmake", "python", "ros", "scenarios", "scripts", "src", "tests", "web"]
+PATH = re.compile(r"(?<![\w/.-])(?:" + "|".join([*FOLDERS, "docs"]) + r")/[\w./-]*\w(?![\w*{/])")
+HISTORY = re.compile(r"\AMade by .*?\n\n", re.DOTALL)
 SKIPPED = {"node_modules", "build", "__pycache__"}
 
 
@@ -54,6 +57,10 @@ def check_page(root, path):
             yield f"{where}: no such file: {target}"
         elif anchor and file.suffix == ".md" and anchor not in anchors(file.read_text()):
             yield f"{where}: no such heading: {match[1]}"
+    history = HISTORY.match(path.read_text())
+    for match in PATH.finditer(path.read_text(), history.end() if history else 0):
+        if not (root / match[0]).exists():
+            yield f"{path.relative_to(root)}:{line_of(path.read_text(), match.start())}: no such file: {match[0]}"
 
 
 def check_source(root, path, sections):

@@ -45,6 +45,14 @@ class LinksTest(unittest.TestCase):
     def test_what_stands_in_a_block_of_code_is_no_link_and_no_heading(self):
         self.one("docs/page.md", "```\n[a](gone.md)\n# Heading\n```\n[b](#heading)\n", "docs/page.md:5")
 
+    def test_a_page_that_names_a_file_that_is_gone_is_a_fault(self):
+        self.one("docs/page.md", "Run `scripts/gone.sh`.\n", "docs/page.md:1", "scripts/gone.sh")
+        self.one("docs/page.md", "```\n\nbenchmarks/gone.py all\n```\n", "docs/page.md:3", "benchmarks/gone.py")
+
+    def test_a_results_page_may_name_what_made_it_then(self):
+        self.assertEqual(self.faults({"docs/page.md": "Made by `scripts/gone.sh`\nat commit `abc`.\n\n# Page\n",
+                                      "README.md": "`docs/images/map_*.png`, apps/src\n", "apps/src": ""}), [])
+
     def test_a_source_that_names_a_page_that_is_gone_is_a_fault(self):
         self.one("src/evpose/serve/a.h", "\n/// See docs/live.md.\n", "src/evpose/serve/a.h:2", "docs/live.md")
 

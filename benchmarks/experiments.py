@@ -74,13 +74,19 @@ def draw_ablation(path, measured):
     svg.write(path)
 
 
+LOCKING = ["locked", "wrong pose called tracking", "not initialised", "median s to lock", "median error mm"]
+
+
 def make_relocalization(bench):
     seeds = 1 if bench.quick else 20
     printed = [bench.once(f"relocalization: {recording.name}, {seeds}",
                           lambda: bench.run("bench", "relocalization", bench.shared / "data/peer", "--only",
                                             recording.name, "--seeds", seeds)) for recording in bench.peers()]
     rows = [row for text in printed for row in tables.read(text)[""]]
-    lines = [printed[0].split("\n", 1)[0], "", *tables.table(list(rows[0]), [row.values() for row in rows])]
+    names, starts = (list(dict.fromkeys(row[column] for row in rows)) for column in ("recording", "start off by"))
+    cells = {(row["recording"], row["start off by"]): ", ".join(row[column] for column in LOCKING) for row in rows}
+    lines = [printed[0].split("\n", 1)[0] + " Cells: " + ", ".join(LOCKING) + ".", "",
+             *tables.table(["start off by", *starts], [[n, *(cells[n, start] for start in starts)] for n in names])]
     return bench.write_page("relocalization", {"starts": lines})
 
 

@@ -95,9 +95,10 @@ Expected<std::unique_ptr<Source>> open_source(const std::string& address, const 
 /// Makes the trackers of a session. The first is made before the data come, since that takes a while.
 class TrackerMaker {
  public:
-  static Expected<TrackerMaker> create(const TrackJob& job) {
-    TrackerMaker out(job);
-    auto first = Tracker::create(job.setup, job.config.tracker, job.start, wall_s);
+  /// `pictures`: the trackers keep what is drawn.
+  static Expected<TrackerMaker> create(const TrackJob& job, bool pictures) {
+    TrackerMaker out(job, pictures);
+    auto first = out.make(job.start, false);
     if (!first) return first.error();
     out.first_ = std::move(*first);
     return out;
@@ -113,13 +114,16 @@ class TrackerMaker {
       fusion.start_rotation_sigma_rad = std::max(fusion.start_rotation_sigma_rad, kAgainRotation_rad);
       fusion.start_velocity_sigma_m_s = std::max(fusion.start_velocity_sigma_m_s, kAgainSpeed_m_s);
     }
-    return Tracker::create(job_->setup, config, start, wall_s);
+    auto made = Tracker::create(job_->setup, config, start, wall_s);
+    if (made) (*made)->keep_time_surface(pictures_);
+    return made;
   }
 
  private:
-  explicit TrackerMaker(const TrackJob& job) : job_(&job) {}
+  TrackerMaker(const TrackJob& job, bool pictures) : job_(&job), pictures_(pictures) {}
 
   const TrackJob* job_;
+  bool pictures_;
   std::unique_ptr<Tracker> first_;
 };
 
@@ -244,7 +248,7 @@ Expected<int> serve(const ServeRequest& request) {
   if (!job) return job.error();
   auto source = open_source(address, *job, config->replay);
   if (!source) return source.error();
-  auto maker = TrackerMaker::create(*job);
+  auto maker = TrackerMaker::create(*job, request.view >= 0);
   if (!maker) return maker.error();
   const auto placement = read_map_placement(job->map->source);
   if (!placement) return placement.error();

@@ -7,52 +7,43 @@
 
 namespace evpose {
 namespace {
-constexpr double kLongestBurst_s = 0.1;
-constexpr double kShortestBurst_s = 1e-3;
 constexpr double kAllowed_us = 5000;  // of the limit's rate may come at once
 constexpr std::size_t kAhead = 16;    // events; as long as memory takes to answer
-
-Polarity polarity_of(const Event& e) { return e.on ? Polarity::on : Polarity::off; }
 }  // namespace
 
 void describe(ConfigTable& table, EventFrontConfig& c) {
   table.group("filter", c.filter);
   table.add("most_mev_s", c.most_mev_s, "Mev/s", "events are shed beyond this rate; 0: never", {0, 1e5});
-  table.add("burst_px", c.burst_px, "px", "quiet time, as predicted motion, that ends a pixel's burst",
-            {0.01, 100});
 }
 
 EventFront::EventFront(int width, int height, const EventFrontConfig& config)
-    : config_(config), filter_(width, height, config.filter), surface_(width, height) {
-  set_motion(0);
-}
+    : config_(config), width_(width), height_(height), filter_(width, height, config.filter) {}
 
-void EventFront::set_motion(double flow_px_per_s) {
-  filter_.set_motion(flow_px_per_s);
-  const double s = flow_px_per_s > 0 ? config_.burst_px / flow_px_per_s : kLongestBurst_s;
-  burst_us_ = static_cast<std::uint32_t>(std::clamp(s, kShortestBurst_s, kLongestBurst_s) * 1e6);
+void EventFront::set_motion(double flow_px_per_s) { filter_.set_motion(flow_px_per_s); }
+
+void EventFront::keep_surface(bool on) {
+  if (!on) return surface_.reset();
+  if (!surface_) surface_.emplace(width_, height_);
 }
 
 void EventFront::rebase(std::uint32_t shift_us) {
   filter_.rebase(shift_us);
-  surface_.rebase(shift_us);
+  if (surface_) surface_->rebase(shift_us);
   refilled_us_ = refilled_us_ > shift_us ? refilled_us_ - shift_us : 0;
   for (FrontEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
 
 void EventFront::take(const EventPacket& packet, std::span<const Event> events) {
   if (events.empty()) return;
-  const int width = surface_.width(), height = surface_.height();
   std::int64_t base_us = clock_.microseconds(packet.time(events.front())) - events.front().dt_us;
-  std::size_t drawn = kept_.size();
   for (std::size_t i = 0; i < events.size(); ++i) {
     if (i + kAhead < events.size()) {
       const Event& later = events[i + kAhead];
-      if (later.x < width && later.y < height) filter_.prefetch(later.x, later.y);
+      if (later.x < width_ && later.y < height_) filter_.prefetch(later.x, later.y);
     }
     const Event& e = events[i];
     ++counts_.read;
-    if (e.x >= width || e.y >= height) {
+    if (e.x >= width_ || e.y >= height_) {
       ++counts_.outside;
       continue;
     }
@@ -65,14 +56,11 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
       ++counts_.shed;
       continue;
     }
-    if (!filter_.keep(e.x, e.y, e.on != 0, stamp)) continue;
+    if (!filter_.keep(e.x, e.y, stamp)) continue;
     ++counts_.kept;
     kept_.push_back({stamp, e.x, e.y, e.on});
-    surface_.prefetch(e.x, e.y, polarity_of(e));
-    // The surface follows some events behind, when its memory has answered.
-    if (kept_.size() - drawn > kAhead) draw(kept_[drawn++]);
+    if (surface_) surface_->insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, stamp);
   }
-  while (drawn < kept_.size()) draw(kept_[drawn++]);
 }
 
 /// The fuller the last milliseconds were, the fewer events pass: which of them is by chance, so that no part
@@ -92,10 +80,6 @@ bool EventFront::shed(const Event& e, std::uint32_t stamp_us) {
   }
   allowance_ -= 1;
   return false;
-}
-
-void EventFront::draw(const FrontEvent& e) {
-  surface_.insert(e.x, e.y, e.on != 0 ? Polarity::on : Polarity::off, e.stamp_us, burst_us_);
 }
 
 }  // namespace evpose

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -16,11 +17,10 @@ class ConfigTable;
 struct EventFrontConfig {
   NoiseFilterConfig filter;
   double most_mev_s = 100;  ///< events are shed beyond this rate, spread evenly; 0: never
-  double burst_px = 1.0;    ///< a quiet time of this much predicted motion ends a pixel's burst, px
 };
 void describe(ConfigTable& table, EventFrontConfig& config);
 
-/// An event that passed the filter, on the surface's clock.
+/// An event that passed the filter, in microseconds of the stamps' clock.
 struct FrontEvent {
   std::uint32_t stamp_us;
   std::uint16_t x;
@@ -28,7 +28,7 @@ struct FrontEvent {
   std::uint16_t on : 1;
 };
 
-/// The way of every event: noise filter, then time surface, in one pass.
+/// The way of every event: rate limit and noise filter, in one pass; then, if asked for, the time surface.
 class EventFront {
  public:
   EventFront(int width, int height, const EventFrontConfig& config);
@@ -43,8 +43,12 @@ class EventFront {
   std::span<const FrontEvent> kept() const { return kept_; }
   void forget() { kept_.clear(); }
 
-  const TimeSurface& surface() const { return surface_; }
-  /// Stamp on the surface's clock of a time, for reading the surface.
+  /// From now on every event that is kept is drawn into the time surface, or no longer. The surface begins
+  /// empty.
+  void keep_surface(bool on);
+  /// Null unless it is kept.
+  const TimeSurface* surface() const { return surface_ ? &*surface_ : nullptr; }
+  /// Stamp of a time on the events' clock, which the surface shares.
   std::uint32_t stamp(TimeNs t) const { return clock_.at(t); }
   const NoiseFilter& filter() const { return filter_; }
 
@@ -55,14 +59,13 @@ class EventFront {
 
  private:
   void rebase(std::uint32_t shift_us);
-  void draw(const FrontEvent& event);
   bool shed(const Event& event, std::uint32_t stamp_us);
 
   EventFrontConfig config_;
+  int width_, height_;
   StampClock clock_;
   NoiseFilter filter_;
-  TimeSurface surface_;
-  std::uint32_t burst_us_ = 0;
+  std::optional<TimeSurface> surface_;
   double allowance_ = 0;  ///< events that may come at once now; refilled at the rate's limit
   std::uint32_t refilled_us_ = 0;
   std::vector<FrontEvent> kept_;

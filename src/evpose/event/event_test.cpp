@@ -12,12 +12,9 @@ EventPacket packet(TimeNs base, std::initializer_list<Event> events) { return {b
 
 std::vector<std::uint32_t> contents(const EventFront& front) {
   std::vector<std::uint32_t> out;
-  for (int y = 0; y < front.surface().height(); ++y)
-    for (int x = 0; x < front.surface().width(); ++x)
-      for (Polarity p : {Polarity::off, Polarity::on}) {
-        out.push_back(front.surface().last(x, y, p));
-        out.push_back(front.surface().first(x, y, p));
-      }
+  for (int y = 0; y < front.surface()->height(); ++y)
+    for (int x = 0; x < front.surface()->width(); ++x)
+      for (Polarity p : {Polarity::off, Polarity::on}) out.push_back(front.surface()->last(x, y, p));
   return out;
 }
 
@@ -37,6 +34,7 @@ TEST(NoiseFilter, KeepsAnEventOnlyWithARecentNeighbour) {
   EventFrontConfig config;
   config.filter.support_min_s = config.filter.support_max_s = 5e-3;
   EventFront front(20, 20, config);
+  front.keep_surface(true);
   const auto p = packet(kNsPerS, {{0, 5, 5, 1},        // first of all: no support
                                   {5000, 6, 6, 0},     // neighbour 5 ms ago: kept
                                   {5001, 5, 5, 1},     // its own pixel does not count, but (6, 6) does
@@ -45,19 +43,9 @@ TEST(NoiseFilter, KeepsAnEventOnlyWithARecentNeighbour) {
   front.take(p, p.events);
   EXPECT_EQ(front.counts().read, 5);
   EXPECT_EQ(front.counts().kept, 2);
-  EXPECT_NE(front.surface().last(6, 6, Polarity::off), 0u);
-  EXPECT_NE(front.surface().last(5, 5, Polarity::on), 0u);
-  EXPECT_EQ(front.surface().last(15, 15, Polarity::on), 0u);
-}
-
-TEST(NoiseFilter, SamePolarityAsksForTheSamePolarity) {
-  EventFrontConfig config;
-  config.filter.same_polarity = true;
-  EventFront front(20, 20, config);
-  const auto p = packet(0, {{10, 5, 5, 1}, {11, 6, 5, 0}, {12, 5, 6, 1}});
-  front.take(p, p.events);
-  EXPECT_EQ(front.counts().kept, 1);
-  EXPECT_NE(front.surface().last(5, 6, Polarity::on), 0u);
+  EXPECT_NE(front.surface()->last(6, 6, Polarity::off), 0u);
+  EXPECT_NE(front.surface()->last(5, 5, Polarity::on), 0u);
+  EXPECT_EQ(front.surface()->last(15, 15, Polarity::on), 0u);
 }
 
 TEST(NoiseFilter, WindowIsALengthInTheImage) {
@@ -67,9 +55,9 @@ TEST(NoiseFilter, WindowIsALengthInTheImage) {
   config.support_max_s = 1;
   NoiseFilter filter(10, 10, config);
   filter.set_motion(100);  // 1 px takes 10 ms
-  filter.keep(4, 4, true, 1000);
-  EXPECT_TRUE(filter.keep(5, 4, true, 11000));
-  EXPECT_FALSE(filter.keep(6, 4, true, 22000));
+  filter.keep(4, 4, 1000);
+  EXPECT_TRUE(filter.keep(5, 4, 11000));
+  EXPECT_FALSE(filter.keep(6, 4, 22000));
 }
 
 TEST(NoiseFilter, MasksThePixelThatFiresAlone) {
@@ -77,30 +65,45 @@ TEST(NoiseFilter, MasksThePixelThatFiresAlone) {
   std::uint32_t t = 1;
   for (int i = 0; i < 1000; ++i) {
     t += 1500;
-    filter.keep(20, 20, true, t);                            // 667 Hz, alone
-    if (i % 100 == 0) filter.keep(1 + i / 100, 5, true, t);  // a slow edge
+    filter.keep(20, 20, t);                            // 667 Hz, alone
+    if (i % 100 == 0) filter.keep(1 + i / 100, 5, t);  // a slow edge
   }
   ASSERT_EQ(filter.hot_pixels().size(), 1u);
   EXPECT_EQ(filter.hot_pixels()[0].x, 20);
   EXPECT_EQ(filter.hot_pixels()[0].y, 20);
-  EXPECT_FALSE(filter.keep(20, 20, true, t + 1));
-  EXPECT_FALSE(filter.keep(21, 20, true, t + 2)) << "a hot pixel supports nobody";
+  EXPECT_FALSE(filter.keep(20, 20, t + 1));
+  EXPECT_FALSE(filter.keep(21, 20, t + 2)) << "a hot pixel supports nobody";
 }
 
-TEST(TimeSurface, BurstKeepsItsFirstEventUntilAQuietTime) {
+TEST(TimeSurface, KeepsTheLastEventOfEachPolarity) {
   TimeSurface s(4, 4);
-  s.insert(1, 2, Polarity::on, 100, 1000);
-  s.insert(1, 2, Polarity::on, 900, 1000);
-  EXPECT_EQ(s.first(1, 2, Polarity::on), 100u);
+  s.insert(1, 2, Polarity::on, 100);
+  s.insert(1, 2, Polarity::on, 900);
   EXPECT_EQ(s.last(1, 2, Polarity::on), 900u);
   EXPECT_EQ(s.last(1, 2, Polarity::off), 0u);
-  s.insert(1, 2, Polarity::on, 2000, 1000);
-  EXPECT_EQ(s.first(1, 2, Polarity::on), 2000u);
+  s.insert(1, 2, Polarity::off, 2000);
+  EXPECT_EQ(s.last(1, 2, Polarity::on), 900u);
+  EXPECT_EQ(s.last(1, 2, Polarity::off), 2000u);
+}
+
+TEST(EventFront, TheSurfaceHoldsWhatWasKeptSinceItWasAskedFor) {
+  EventFront front(20, 20, {});
+  const auto first = packet(0, {{10, 5, 5, 1}, {11, 6, 5, 1}}), second = packet(0, {{20, 5, 6, 1}});
+  front.take(first, first.events);
+  EXPECT_EQ(front.surface(), nullptr);
+  front.keep_surface(true);
+  front.take(second, second.events);
+  EXPECT_EQ(front.surface()->last(6, 5, Polarity::on), 0u);
+  EXPECT_NE(front.surface()->last(5, 6, Polarity::on), 0u);
+  front.keep_surface(false);
+  EXPECT_EQ(front.surface(), nullptr);
 }
 
 TEST(EventFront, IsTheSameHoweverThePacketsAreCut) {
   const EventPacket all = random_events(20000, 40, 30, 30);
   EventFront whole(40, 30, {}), cut(40, 30, {});
+  whole.keep_surface(true);
+  cut.keep_surface(true);
   whole.take(all, all.events);
   const std::span<const Event> events(all.events);
   for (std::size_t i = 0; i < events.size(); i += 137) {
@@ -117,11 +120,12 @@ TEST(EventFront, IsTheSameHoweverThePacketsAreCut) {
 
 TEST(EventFront, ClockSurvivesHoursOfData) {
   EventFront front(10, 10, {});
+  front.keep_surface(true);
   TimeNs t = 1'700'000'000 * kNsPerS;
   for (int minute = 0; minute < 200; ++minute, t += 60 * kNsPerS) {
     const auto p = packet(t, {{0, 4, 4, 1}, {500, 5, 4, 1}});
     front.take(p, p.events);
-    EXPECT_EQ(front.stamp(t + 500 * kNsPerUs), front.surface().last(5, 4, Polarity::on)) << minute;
+    EXPECT_EQ(front.stamp(t + 500 * kNsPerUs), front.surface()->last(5, 4, Polarity::on)) << minute;
   }
   EXPECT_EQ(front.counts().kept, 200);
 }

@@ -7,6 +7,12 @@
 #include "evpose/event/time_surface.h"
 
 namespace evpose {
+namespace {
+
+constexpr double kHotFactor = 20;         // times the median of active pixels: a pixel that fires by itself
+constexpr double kHotLeastPerSecond = 20;  // unsupported events of a hot pixel: below it does no harm
+
+}  // namespace
 
 void describe(ConfigTable& table, NoiseFilterConfig& c) {
   table.add("on", c.on, "drop events without a recent event among their 8 neighbours");
@@ -14,18 +20,11 @@ void describe(ConfigTable& table, NoiseFilterConfig& c) {
             {0.01, 100});
   table.add("support_min_s", c.support_min_s, "s", "shortest support window", {1e-5, 10});
   table.add("support_max_s", c.support_max_s, "s", "longest support window", {1e-5, 10});
-  table.add("same_polarity", c.same_polarity, "only events of the same polarity support each other");
-  table.add("hot_factor", c.hot_factor, "",
-            "unsupported events over the median of active pixels that make a pixel hot", {1, 1e6});
-  table.add("hot_min_events", c.hot_min_events, "1/s", "fewest unsupported events of a hot pixel",
-            {1, 60000});
 }
 
 NoiseFilter::NoiseFilter(int width, int height, const NoiseFilterConfig& config)
     : config_(config), width_(width), height_(height), stride_(static_cast<std::size_t>(width + 2)) {
-  const std::size_t n = stride_ * static_cast<std::size_t>(height + 2);
-  cells_.resize(n);
-  if (config.same_polarity) last_on_.resize(n);
+  cells_.resize(stride_ * static_cast<std::size_t>(height + 2));
   set_motion(0);
 }
 
@@ -43,13 +42,12 @@ void NoiseFilter::end_second(std::uint32_t stamp_us) {
     if (!active.empty()) {
       const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
       std::nth_element(active.begin(), middle, active.end());
-      const double limit = std::max<double>(config_.hot_min_events, config_.hot_factor * *middle);
+      const double limit = std::max(kHotLeastPerSecond, kHotFactor * *middle);
       for (int y = 0; y < height_; ++y)
         for (int x = 0; x < width_; ++x) {
           Cell& c = cells_[index(x, y)];
           if (c.unsupported == kMasked || c.unsupported < limit) continue;
           c = {0, 0, kMasked};  // its past events support nobody
-          if (!last_on_.empty()) last_on_[index(x, y)] = 0;
           hot_.push_back({x, y});
         }
     }
@@ -63,7 +61,6 @@ void NoiseFilter::end_second(std::uint32_t stamp_us) {
 
 void NoiseFilter::rebase(std::uint32_t shift_us) {
   for (Cell& c : cells_) c.last = c.last > shift_us ? c.last - shift_us : 0;
-  rebase_stamps(last_on_, shift_us);
   second_end_us_ = second_end_us_ > shift_us ? second_end_us_ - shift_us : 1;
 }
 

@@ -14,11 +14,8 @@ class ConfigTable;
 struct NoiseFilterConfig {
   bool on = true;
   double support_px = 1.0;       ///< a neighbour's event supports for this much predicted motion, px
-  double support_min_s = 2e-3;   ///< ... but at least this long
-  double support_max_s = 30e-3;  ///< ... and at most
-  bool same_polarity = false;    ///< support only by events of the same polarity
-  double hot_factor = 20;        ///< a pixel with more unsupported events than this times the median is hot
-  int hot_min_events = 20;       ///< ... if it had at least so many within the second
+  double support_min_s = 2e-3;   ///< shortest time of support
+  double support_max_s = 30e-3;  ///< longest time of support; equal to the shortest: the paper's constant
 };
 void describe(ConfigTable& table, NoiseFilterConfig& config);
 
@@ -33,19 +30,12 @@ class NoiseFilter {
   void set_motion(double flow_px_per_s);
 
   /// True if the event is to be kept. O(1) but for one pass over the pixels a second. Pixel inside the image.
-  bool keep(int x, int y, bool on, std::uint32_t stamp_us) {
+  bool keep(int x, int y, std::uint32_t stamp_us) {
     if (stamp_us >= second_end_us_) end_second(stamp_us);
-    const std::size_t i = index(x, y);
-    Cell& cell = cells_[i];
+    Cell& cell = cells_[index(x, y)];
     if (cell.unsupported == kMasked) return false;
-    bool supported = false;
-    if (config_.same_polarity && on) {
-      supported = newest_neighbour(&last_on_[i]) + support_us_ >= stamp_us;
-      last_on_[i] = stamp_us;
-    } else {
-      supported = newest_neighbour(&cell) + support_us_ >= stamp_us;
-      cell.last = stamp_us;
-    }
+    const bool supported = newest_neighbour(&cell) + support_us_ >= stamp_us;
+    cell.last = stamp_us;
     if (cell.seen != 0xFFFF) ++cell.seen;
     if (!supported && cell.unsupported != kMasked - 1) ++cell.unsupported;
     return supported || !config_.on;
@@ -74,21 +64,18 @@ class NoiseFilter {
     std::uint32_t last = 0;
     std::uint16_t seen = 0, unsupported = 0;  ///< events this second; kMasked: of a hot pixel
   };
-  static std::uint32_t stamp_of(const Cell& cell) { return cell.last; }
-  static std::uint32_t stamp_of(std::uint32_t stamp) { return stamp; }
 
   std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y + 1) * stride_ + static_cast<std::size_t>(x + 1);
   }
-  template <class Stamp>
-  std::uint32_t newest_neighbour(const Stamp* row) const {
-    const Stamp* const up = row - stride_;
-    const Stamp* const down = row + stride_;
+  std::uint32_t newest_neighbour(const Cell* row) const {
+    const Cell* const up = row - stride_;
+    const Cell* const down = row + stride_;
     const auto later = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
     const std::uint32_t a =
-        later(later(stamp_of(up[-1]), stamp_of(up[0])), later(stamp_of(up[1]), stamp_of(row[-1])));
+        later(later(up[-1].last, up[0].last), later(up[1].last, row[-1].last));
     const std::uint32_t b =
-        later(later(stamp_of(down[-1]), stamp_of(down[0])), later(stamp_of(down[1]), stamp_of(row[1])));
+        later(later(down[-1].last, down[0].last), later(down[1].last, row[1].last));
     const std::uint32_t newest = later(a, b);
     // "Never" must not support the first moments of the clock.
     return newest == 0 ? 0 - support_us_ : newest;
@@ -100,8 +87,7 @@ class NoiseFilter {
   std::size_t stride_;
   std::uint32_t support_us_;
   std::uint32_t second_end_us_ = 0;
-  RandomAccessTable<Cell> cells_;       ///< with a border of one pixel
-  std::vector<std::uint32_t> last_on_;  ///< of on events, if same_polarity; the cells' are of off events then
+  RandomAccessTable<Cell> cells_;  ///< with a border of one pixel
   std::vector<Pixel> hot_;
 };
 

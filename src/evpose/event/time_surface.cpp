@@ -12,15 +12,12 @@ void rebase_stamps(std::vector<std::uint32_t>& stamps, std::uint32_t shift) {
 TimeSurface::TimeSurface(int width, int height)
     : width_(width), height_(height), stride_(static_cast<std::size_t>(width + 2 * kBorder)) {
   EVPOSE_CHECK(width > 0 && height > 0);
-  for (auto& plane : cells_) plane.resize(stride_ * static_cast<std::size_t>(height + 2 * kBorder));
+  for (auto& plane : last_) plane.resize(stride_ * static_cast<std::size_t>(height + 2 * kBorder));
 }
 
 void TimeSurface::rebase(std::uint32_t shift_us) {
-  for (auto& plane : cells_)
-    for (auto& c : plane) {
-      c.last = c.last > shift_us ? c.last - shift_us : 0;
-      c.first = c.last == 0 ? 0 : c.first > shift_us ? c.first - shift_us : 1;
-    }
+  for (auto& plane : last_)
+    for (std::uint32_t& stamp : plane) stamp = stamp > shift_us ? stamp - shift_us : 0;
 }
 
 }  // namespace evpose

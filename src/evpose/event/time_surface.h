@@ -57,9 +57,9 @@ void rebase_stamps(std::vector<std::uint32_t>& stamps, std::uint32_t shift);
 
 enum class Polarity : std::uint8_t { off = 0, on = 1 };
 
-/// Separated-polarity time surface (EV-Pose 4.1): per polarity and pixel, the time of the last event and of
-/// the first event of its burst. T(x, t) = exp(-(t - last(x)) / eta) is evaluated only where it is read. A
-/// border of `kBorder` pixels lets readers take small patches around any pixel of the image unchecked.
+/// Separated-polarity time surface (EV-Pose 4.1): per polarity and pixel, the time of the last event.
+/// T(x, t) = exp(-(t - last(x)) / eta) is evaluated only where it is read. A border of `kBorder` pixels lets
+/// readers take small patches around any pixel of the image unchecked.
 class TimeSurface {
  public:
   static constexpr int kBorder = 4;
@@ -69,39 +69,25 @@ class TimeSurface {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// O(1). `burst_us`: a quiet time longer than this starts a new burst. Pixel inside the image.
-  void insert(int x, int y, Polarity polarity, std::uint32_t stamp_us, std::uint32_t burst_us) {
-    Cell& c = cells_[static_cast<int>(polarity)][index(x, y)];
-    if (c.last == 0 || stamp_us - c.last > burst_us) c.first = stamp_us;
-    c.last = stamp_us;
-  }
-
-  /// Brings what insert() touches near. Pixel inside the image.
-  void prefetch(int x, int y, Polarity polarity) const {
-    __builtin_prefetch(&cells_[static_cast<int>(polarity)][index(x, y)], 1);
+  /// O(1). Pixel inside the image.
+  void insert(int x, int y, Polarity polarity, std::uint32_t stamp_us) {
+    last_[static_cast<int>(polarity)][index(x, y)] = stamp_us;
   }
 
   /// Stamp of the last event, 0 if none. Valid up to kBorder pixels outside of the image (always 0 there).
   std::uint32_t last(int x, int y, Polarity polarity) const {
-    return cells_[static_cast<int>(polarity)][index(x, y)].last;
-  }
-  /// Stamp of the first event of the last burst, 0 if none.
-  std::uint32_t first(int x, int y, Polarity polarity) const {
-    return cells_[static_cast<int>(polarity)][index(x, y)].first;
+    return last_[static_cast<int>(polarity)][index(x, y)];
   }
 
   void rebase(std::uint32_t shift_us);
 
  private:
-  struct Cell {
-    std::uint32_t last = 0, first = 0;
-  };
   std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y + kBorder) * stride_ + static_cast<std::size_t>(x + kBorder);
   }
   int width_, height_;
   std::size_t stride_;
-  RandomAccessTable<Cell> cells_[2];
+  RandomAccessTable<std::uint32_t> last_[2];
 };
 
 }  // namespace evpose

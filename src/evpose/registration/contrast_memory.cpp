@@ -4,51 +4,46 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evpose/core/config.h"
-
 namespace evpose {
 namespace {
 
 constexpr double kDoubt_px2 = 20;  // of a step of none, before anything is seen
 
+// Law of the edge delay, as measured in simulated flights: by contrast in steps n of the threshold,
+// min(largest, least + by_contrast / n).
+constexpr double kLeastDelay_px = 0.06;
+constexpr double kDelayByContrast_px = 0.04;
+constexpr double kLargestDelay_px = 0.16;
+
 }  // namespace
 
-void describe(ConfigTable& table, ContrastConfig& c) {
-  table.add("threshold", c.threshold, "", "contrast of the log luminance that makes an event", {0.01, 2});
-  table.add("lateness_px", c.lateness_px, "px", "events come at least so much after the contour", {-1, 1});
-  table.add("threshold_px", c.threshold_px, "px",
-            "... and by this, divided by the steps of the threshold, more", {0, 1});
-  table.add("latest_px", c.latest_px, "px", "... but not by more than this", {0, 2});
-  table.add("unknown_lateness_px", c.unknown_lateness_px, "px", "lateness of contours not known yet",
-            {-1, 1});
-  table.add("memory_px2", c.memory_px2, "px^2", "area swept until what was learnt counts half", {50, 1e9});
+ContrastMemory::ContrastMemory(std::uint32_t segments, double threshold)
+    : threshold_(threshold), segments_(segments) {}
+
+void ContrastMemory::sweep(std::uint32_t segment, double area_px2) {
+  Segment& s = segments_[segment];
+  s.swept_px2 += static_cast<float>(area_px2);
+  if (s.swept_px2 > kMemory_px2) s.swept_px2 *= 0.5F, s.net *= 0.5F;
 }
 
-ContrastMemory::ContrastMemory(std::uint32_t pieces, const ContrastConfig& config)
-    : config_(config), pieces_(pieces) {}
-
-void ContrastMemory::sweep(std::uint32_t piece, double area_px2) {
-  Piece& p = pieces_[piece];
-  p.swept_px2 += static_cast<float>(area_px2);
-  if (p.swept_px2 > config_.memory_px2) p.swept_px2 *= 0.5F, p.net *= 0.5F;
+void ContrastMemory::count(std::uint32_t segment, int sign) {
+  segments_[segment].net += static_cast<float>(sign);
 }
 
-void ContrastMemory::count(std::uint32_t piece, int sign) { pieces_[piece].net += static_cast<float>(sign); }
-
-double ContrastMemory::steps(std::uint32_t piece) const {
-  const Piece& p = pieces_[piece];
-  return p.net / (p.swept_px2 + kDoubt_px2);
+double ContrastMemory::steps(std::uint32_t segment) const {
+  const Segment& s = segments_[segment];
+  return s.net / (s.swept_px2 + kDoubt_px2);
 }
 
-ContrastMemory::Lateness ContrastMemory::lateness(std::uint32_t piece) const {
-  const double n = std::abs(steps(piece));
-  const double late = known(piece) ? std::min(config_.latest_px,
-                                              config_.lateness_px + config_.threshold_px / std::max(n, 1e-3))
-                                   : config_.unknown_lateness_px;
+ContrastMemory::EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
+  const double n = std::abs(steps(segment));
+  const double delay = known(segment) ? std::min(kLargestDelay_px,
+                                                 kLeastDelay_px + kDelayByContrast_px / std::max(n, 1e-3))
+                                      : kUnknownDelay_px;
   // Where the logarithm is halfway between both sides, of a pixel's width; s: square root of their ratio.
-  const double s = std::exp(0.5 * n * config_.threshold);
+  const double s = std::exp(0.5 * n * threshold_);
   const double towards_dark = 0.5 - 1 / (1 + s);
-  return {late - towards_dark, late + towards_dark};
+  return {delay - towards_dark, delay + towards_dark};
 }
 
 }  // namespace evpose

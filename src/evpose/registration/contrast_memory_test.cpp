@@ -8,6 +8,8 @@
 namespace evpose {
 namespace {
 
+constexpr double kThreshold = 0.25;
+
 void show(ContrastMemory& memory, double steps, double area_px2) {
   for (int k = 0; k < static_cast<int>(area_px2 / 10); ++k) {
     memory.sweep(0, 10);
@@ -18,7 +20,7 @@ void show(ContrastMemory& memory, double steps, double area_px2) {
 
 TEST(ContrastMemory, LearnsSizeAndSignOfAStep) {
   for (double steps : {-4.0, -1.0, 0.5, 3.0}) {
-    ContrastMemory memory(1, {});
+    ContrastMemory memory(1, kThreshold);
     EXPECT_FALSE(memory.known(0));
     show(memory, steps, 2000);
     EXPECT_TRUE(memory.known(0));
@@ -27,14 +29,14 @@ TEST(ContrastMemory, LearnsSizeAndSignOfAStep) {
 }
 
 TEST(ContrastMemory, ForgetsWhatNoLongerHolds) {
-  ContrastMemory memory(1, {});
+  ContrastMemory memory(1, kThreshold);
   show(memory, 3, 2000);
   show(memory, -3, 2000);  // a free rim against another background
   EXPECT_LT(memory.steps(0), -2);
 }
 
 TEST(ContrastMemory, TextureOfBothSignsCancels) {
-  ContrastMemory memory(1, {});
+  ContrastMemory memory(1, kThreshold);
   for (int i = 0; i < 500; ++i) {
     memory.sweep(0, 1);
     memory.count(0, i % 2 ? 1 : -1);
@@ -42,12 +44,12 @@ TEST(ContrastMemory, TextureOfBothSignsCancels) {
   EXPECT_LT(std::abs(memory.steps(0)), 0.02);
 }
 
-TEST(ContrastMemory, LatenessFallsWithContrast) {
+TEST(ContrastMemory, EdgeDelayFallsWithContrast) {
   double before = 1;
   for (double steps : {0.2, 0.5, 1.0, 3.0}) {
-    ContrastMemory memory(1, {});
+    ContrastMemory memory(1, kThreshold);
     show(memory, steps, 500);
-    const double mean = 0.5 * (memory.lateness(0).on_px + memory.lateness(0).off_px);
+    const double mean = 0.5 * (memory.edge_delay(0).on_px + memory.edge_delay(0).off_px);
     EXPECT_LE(mean, before);
     before = mean;
   }
@@ -56,14 +58,12 @@ TEST(ContrastMemory, LatenessFallsWithContrast) {
 TEST(ContrastMemory, EventsLieTowardsTheDarkSide) {
   // A pixel half of whose logarithm is reached: bright share b of a step of ratio r, (1 - b) / r + b =
   // r^-1/2.
-  ContrastConfig config;
-  config.lateness_px = config.threshold_px = config.unknown_lateness_px = 0;
-  ContrastMemory memory(1, config);
+  ContrastMemory memory(1, kThreshold);
   show(memory, 4, 590);
-  const double r = std::exp(memory.steps(0) * config.threshold);
+  const double r = std::exp(memory.steps(0) * kThreshold);
   const double bright = (std::sqrt(1 / r) - 1 / r) / (1 - 1 / r);
-  EXPECT_NEAR(memory.lateness(0).off_px, 0.5 - bright, 1e-6);
-  EXPECT_NEAR(memory.lateness(0).on_px, bright - 0.5, 1e-6);
+  const ContrastMemory::EdgeDelay delay = memory.edge_delay(0);
+  EXPECT_NEAR(delay.off_px - delay.on_px, 1 - 2 * bright, 1e-6);
 }
 
 }  // namespace

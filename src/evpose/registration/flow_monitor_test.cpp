@@ -10,22 +10,24 @@ namespace {
 
 constexpr double kStep_s = 1.0 / 300;
 
-FlowConfig on() {
-  FlowConfig config;
-  config.on = true;
-  return config;
+FrontEvent event_at(int x, std::uint32_t stamp_us) {
+  FrontEvent e{};
+  e.stamp_us = stamp_us;
+  e.x = static_cast<std::uint16_t>(x);
+  e.y = 4;
+  e.on = 1;
+  return e;
 }
 
 /// An upright edge that moves to the right at `speed_px_s` over a surface; the answers of its events when
 /// `expected_px_s` is predicted along the normal (nx, 0).
 int agreeing(double speed_px_s, float expected_px_s, float nx = 1) {
-  FlowMonitor monitor(on());
   TimeSurface surface(64, 8);
   int agree = 0;
   for (int x = 0; x < 64; ++x) {
     const auto stamp = static_cast<std::uint32_t>(10 + 1e6 * x / speed_px_s);
-    surface.insert(x, 4, Polarity::on, stamp, 1000);
-    agree += x >= 8 && monitor.ask(surface, x, 4, Polarity::on, stamp, nx, 0, expected_px_s) ==
+    surface.insert(x, 4, Polarity::on, stamp);
+    agree += x >= 8 && FlowMonitor::compare(surface, event_at(x, stamp), nx, 0, expected_px_s) ==
                            FlowMonitor::Answer::agrees;
   }
   return agree;
@@ -44,13 +46,12 @@ TEST(FlowMonitor, OneThatMovesOtherwiseDoesNot) {
 }
 
 TEST(FlowMonitor, SlowContoursTellNothing) {
-  const FlowMonitor monitor(on());
   const TimeSurface surface(64, 8);
-  EXPECT_EQ(monitor.ask(surface, 20, 4, Polarity::on, 1000, 1, 0, 5), FlowMonitor::Answer::unknown);
+  EXPECT_EQ(FlowMonitor::compare(surface, event_at(20, 1000), 1, 0, 5), FlowMonitor::Answer::unknown);
 }
 
 TEST(FlowMonitor, ACellBelowTheUsualShareIsMistrustedAndForgivenLater) {
-  FlowMonitor monitor(on());
+  FlowMonitor monitor;
   for (int k = 0; k < 20; ++k) {
     monitor.advance(kStep_s);
     for (std::uint32_t cell = 0; cell < 20; ++cell) monitor.add(cell, 7, 3);
@@ -64,7 +65,7 @@ TEST(FlowMonitor, ACellBelowTheUsualShareIsMistrustedAndForgivenLater) {
 }
 
 TEST(FlowMonitor, AFewEventsAreNoReason) {
-  FlowMonitor monitor(on());
+  FlowMonitor monitor;
   for (std::uint32_t cell = 0; cell < 20; ++cell) monitor.add(cell, 70, 30);
   monitor.add(20, 0, 9);
   monitor.add(21, 6, 6);

@@ -3,84 +3,85 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "evpose/camera/camera.h"
-#include "evpose/core/parallel.h"
 #include "evpose/core/pose.h"
-#include "evpose/event/time_surface.h"
-#include "evpose/registration/temporal_field.h"
+#include "evpose/event/event_front.h"
+#include "evpose/registration/contour_view.h"
 
 namespace evpose {
 
-class ConfigTable;
+class ContrastMemory;
 
-/// What events are compared with.
-enum class FieldKind {
-  events,       ///< each event once, at its own time, against the moving contours
-  exponential,  ///< the paper's temporal distance field, sampled at the contours (eq. 1)
-};
-enum class Solver { gauss_newton, ceres };
-
-/// Settings of `align`, the paper's form.
-struct RegistrationConfig {
-  Solver solver = Solver::gauss_newton;
-  FieldKernel kernel = FieldKernel::spline;
-  double decay_px = 0.5;  ///< time constant of the field as predicted motion of the point across its contour
-  double decay_min_s = 3e-3;   ///< ... but at least
-  double decay_max_s = 30e-3;  ///< ... and at most; min = max gives the paper's constant
-  double robust_scale = 1.1;   ///< residual (0..1) beyond which Tukey's loss is flat
-  double stride_px = 12;       ///< least distance of two points along one contour
-  int max_iterations = 6;
-  double converged_px = 0.01;      ///< a step that moves the points by less ends the iteration
-  double noise = 0.5;              ///< 1 sigma of a residual at the optimum
-  double correlated_points = 300;  ///< so many points share one error: the information is divided by it
-};
-void describe(ConfigTable& table, RegistrationConfig& config);
-
-/// A contour point as one update needs it.
-struct AlignmentPoint {
-  Eigen::Vector3d position_map;  ///< metres
-  double decay_us = 0;           ///< time constant of the field at this point
+enum class RegistrationKind {
+  events,          ///< each event once, at its own time, against the moving contours
+  temporal_field,  ///< EV-Pose eq. (1): the temporal distance field, sampled at the contours
 };
 
-struct AlignmentProblem {
-  const TimeSurface& surface;
-  const Camera& camera;
-  const Pose& T_body_cam;
-  const std::vector<AlignmentPoint>& points;
-  std::uint32_t now_us;  ///< on the surface's clock
-  const Pose& T_map_body_predicted;
-  const Matrix6d& prior_information;  ///< of the predicted pose, perturbed as Pose::plus
+/// What the registration made of an event.
+enum class EventVerdict : std::uint8_t {
+  elsewhere,       ///< near no contour, or between two
+  beside,          ///< near a contour, outside the gate
+  wrong_polarity,  ///< in the gate, but of the excluded polarity
+  other_motion,    ///< in the gate of a cell whose events do not move as the ego-motion says
+  contour,         ///< used
+  predicted,       ///< used, and of the polarity that was predicted
 };
 
-struct AlignmentResult {
-  Pose T_map_body;                          ///< minimum of the points' and the prior's cost together
-  Matrix6d information = Matrix6d::Zero();  ///< of the points alone, at the minimum
-  Vector6d vector =
-      Vector6d::Zero();  ///< information * (offset of the points' own minimum from the prediction)
-  int iterations = 0;
-  bool converged = false;
-  int seen = 0;     ///< points inside the image
-  int matched = 0;  ///< of these, with a field of at least 1/e
-  double cost = 0;  ///< mean of the points' robust loss
+/// What one measurement is made from.
+struct RegistrationProblem {
+  std::span<const FrontEvent> events;  ///< kept since the last update
+  std::uint32_t now_us;                ///< time of the update, on the events' clock
+  double span_s;                       ///< since the last update
+  std::span<const ContourSample> samples;
+  const Matrix6d& pose_covariance;                ///< of the prediction
+  const TimeSurface* surface = nullptr;           ///< with these events; null unless reads_surface()
+  const ContourView* view = nullptr;              ///< that the samples were made with
+  Pose T_map_body = {};                           ///< the prediction
+  std::vector<EventVerdict>* verdicts = nullptr;  ///< of each event, if asked for
 };
 
-/// EV-Pose eq. (1) with the prediction as prior (eq. 5 for the newest state):
-///   min over d of  sum_i rho(1 - T(pi(T_cam_map p_i))) / s^2 + d^T P^-1 d,
-/// rho Tukey's biweight, by Gauss-Newton with step control.
-AlignmentResult align(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool);
+/// What one measurement says. Near the predicted pose its cost is d^T information d / 2 - vector^T d, with d
+/// as in Pose::plus.
+struct RegistrationResult {
+  Matrix6d information = Matrix6d::Zero();
+  Vector6d vector = Vector6d::Zero();
+  double residual = 0;     ///< RMS of event distances, px; of the temporal field's robust loss, 0..1
+  int points = 0;          ///< contour samples that were compared
+  int inliers = 0;         ///< of these, with events
+  int events = 0;          ///< in the gates of the samples
+  int wrong_polarity = 0;  ///< events near contours that were left out for their polarity
+  int other_motion = 0;    ///< events in the gate of cells that are mistrusted, by more than a half
+  bool converged = true;
+  /// 1: all events in the gates lie at the contours; 0: evenly over the gates, or too few to tell.
+  double gate_concentration = 1;
+  bool consistent = true;  ///< the events in the gates concentrate at the map's contours
+};
 
-/// The same minimum by Ceres: the reference for `align`.
-AlignmentResult align_ceres(const AlignmentProblem& problem, const RegistrationConfig& config);
+/// What the events of one sample ask for: that the pose moves its contour by `offset_px`.
+struct SampleOffset {
+  std::size_t sample;
+  double offset_px, weight;  ///< weight: px^-2, as it enters the information
+};
 
-/// Fills information, vector, seen, matched and cost of a result from its pose.
-void evaluate_information(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool,
-                          AlignmentResult* result);
+/// Measures the pose by events and contours.
+class Registration {
+ public:
+  Registration() = default;
+  Registration(const Registration&) = delete;
+  Registration& operator=(const Registration&) = delete;
+  virtual ~Registration() = default;
 
-/// Residual 1 - T of one point and its derivative by the pose perturbation; false, 1 and zero outside of the
-/// image.
-bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const Pose& T_map_body,
-                    const AlignmentPoint& point, double* residual, Vector6d* jacobian);
+  virtual RegistrationResult measure(const RegistrationProblem& problem) = 0;
+  /// The pose comes from elsewhere: how well events met the contours until now does not count any more.
+  virtual void restart() {}
+  /// Whether `measure` wants the time surface.
+  virtual bool reads_surface() const = 0;
+  /// Of the last measurement: its information and vector, sample by sample; none if it is no sum over samples.
+  virtual std::span<const SampleOffset> offsets() const { return {}; }
+  /// What has been learnt of the contours' contrast; null if nothing is.
+  virtual const ContrastMemory* contrast() const { return nullptr; }
+};
 
 }  // namespace evpose

@@ -24,6 +24,7 @@ namespace {
 constexpr std::size_t kUnitCheckSamples = 20'000;  // of the IMU, looked at before the run
 constexpr std::size_t kDrawnMapPoints = 20'000;    // handed to the report
 constexpr double kOverlayDecay_s = 0.02;
+constexpr TimeNs kOverlayLead = 100 * kNsPerMs;  // a surface is kept so long before its picture
 
 /// Looks at the first seconds of the IMU before anything is made of them.
 Status check_units(const Recording& recording, const std::vector<TimedPose>& truth) {
@@ -209,9 +210,11 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
     ++updates;
     most_points = std::max(most_points, u.points);
     if (updates == 1) next_overlay = start.t + overlay_step;
-    if (u.t < next_overlay || config.overlays == 0) return;
+    if (config.overlays == 0) return;
+    (*tracker)->keep_time_surface(u.t + kOverlayLead >= next_overlay);
+    if (u.t < next_overlay) return;
     next_overlay += overlay_step;
-    const Tracker::Snapshot s = (*tracker)->snapshot(kOverlayDecay_s);
+    const Snapshot s = (*tracker)->snapshot(kOverlayDecay_s);
     std::vector<OverlayPoint> points;
     for (const auto& p : s.points) points.push_back({p.x, p.y, p.matched});
     run->add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start.t)), " s"),

@@ -29,10 +29,10 @@ VisibleSetConfig points_to_refine(VisibleSetConfig config) {
 }
 
 /// Contrast is not known from a pose that may be wrong, so polarity is not asked.
-EventAlignmentConfig under_gate(EventAlignmentConfig config, double gate_px) {
+EventRegistrationConfig under_gate(EventRegistrationConfig config, double gate_px) {
   config.gate_px = config.widest_gate_px = gate_px;
-  config.count_px = kContrastReach_px;
-  config.polarity = config.honest_slope = false;
+  config.contrast_band_px = kContrastReach_px;
+  config.polarity = config.gate_truncation_correction = false;
   return config;
 }
 
@@ -43,11 +43,11 @@ HypothesisRefiner::HypothesisRefiner(const RelocalizerScene& scene, const Hypoth
       index_(scene.index),
       segments_(scene.segments),
       camera_(scene.camera),
-      map_sigma_m_(scene.alignment.map_sigma_m),
+      map_sigma_m_(scene.registration.map_sigma_m),
       visible_(index_, camera_, points_to_refine(scene.visible)) {
-  alignments_.reserve(kGates_px.size());
+  
   for (const double gate_px : kGates_px)
-    alignments_.emplace_back(camera_.size(), under_gate(scene.alignment, gate_px), segments_.count);
+    registrations_.emplace_back(camera_.size(), under_gate(scene.registration, gate_px), segments_.count);
 }
 
 void HypothesisRefiner::add_events(std::span<const FrontEvent> events, std::uint32_t now_us,
@@ -79,26 +79,26 @@ void HypothesisRefiner::refine(PoseHypothesis& h, const Pose& T_body_cam, int sl
   prior_information.segment<3>(3).setConstant(1 / (kPriorSigma_rad * kPriorSigma_rad));
   prior_information.segment<3>(6).setConstant(
       std::pow(slices < kVelocityKnownAfter ? kUnknownVelocitySigma_m_s : kPriorSigma_m_s, -2));
-  for (EventAlignment& alignment : alignments_)
+  for (Registration& registration : registrations_)
     for (int step = 0; step < kStepsPerGate; ++step) {
       Vector9d off;
       off << h.nav.T_map_body.minus(from.T_map_body), h.nav.velocity - from.velocity;
       NormalEquations equations{prior_information.asDiagonal(), -prior_information.cwiseProduct(off)};
-      add_intervals(alignment, view, points, intervals, h, equations);
+      add_intervals(registration, view, points, intervals, h, equations);
       const Vector9d d = equations.H.ldlt().solve(equations.b);
       // The last look is at the refined pose: it only measures.
-      const bool last = &alignment == &alignments_.back() && step + 1 == kStepsPerGate;
+      const bool last = &registration == &registrations_.back() && step + 1 == kStepsPerGate;
       if (!d.allFinite() || last) continue;
       h.nav.T_map_body = h.nav.T_map_body.plus(d.head<6>());
       h.nav.velocity += d.tail<3>();
     }
 }
 
-void HypothesisRefiner::add_intervals(EventAlignment& alignment, const ContourView& view,
+void HypothesisRefiner::add_intervals(Registration& registration, const ContourView& view,
                                       std::span<const std::uint32_t> points, std::size_t intervals,
                                       PoseHypothesis& h, NormalEquations& equations) {
   const Matrix6d pose_covariance = Matrix6d::Zero();  // the gates are as they are
-  alignment.forget();
+  registration.restart();
   NavState nav = h.nav;
   double age_s = 0, matched = 0, asked = 0;
   for (std::size_t k = 0; k < intervals; ++k) {
@@ -106,10 +106,10 @@ void HypothesisRefiner::add_intervals(EventAlignment& alignment, const ContourVi
     const double span_s = interval.motion.dt_s;
     const BodyMotion body{nav.T_map_body, nav.velocity, motion_.angular_rate(h, interval.angular_rate)};
     project_contours(view, points, body, span_s, samples_);
-    const EventAlignmentResult r =
-        alignment.align({interval.events, interval.now_us, span_s, samples_, pose_covariance});
-    h.concentration = r.slope;
-    matched += r.matched_events;
+    const RegistrationResult r =
+        registration.measure({interval.events, interval.now_us, span_s, samples_, pose_covariance});
+    h.concentration = r.gate_concentration;
+    matched += r.events;
     asked += static_cast<double>(samples_.size());
     // Derivative of the pose at this age by the newest pose and velocity.
     Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();

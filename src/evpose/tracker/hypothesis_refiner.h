@@ -11,8 +11,8 @@
 #include "evpose/imu/strapdown.h"
 #include "evpose/map/contour_segments.h"
 #include "evpose/map/visible_set.h"
-#include "evpose/registration/event_alignment.h"
-#include "evpose/tracker/contour_view.h"
+#include "evpose/registration/event_registration.h"
+#include "evpose/registration/contour_view.h"
 #include "evpose/tracker/pose_hypothesis.h"
 
 namespace evpose {
@@ -25,7 +25,7 @@ struct RelocalizerScene {
   const Camera& camera;
   Eigen::Vector3d gravity_map;     ///< zero when there is no IMU
   VisibleSetConfig visible;        ///< the search has its own number and spacing of points
-  EventAlignmentConfig alignment;  ///< the search has its own gates and leaves polarity out
+  EventRegistrationConfig registration;  ///< the search has its own gates and leaves polarity out
 };
 
 /// Refines pose and velocity of a hypothesis together: the single events of the last 40 ms at their own
@@ -62,7 +62,7 @@ class HypothesisRefiner {
     Vector9d b;
   };
   /// Adds the newest `intervals` at the hypothesis' pose, and tells its concentration and support.
-  void add_intervals(EventAlignment& alignment, const ContourView& view,
+  void add_intervals(Registration& registration, const ContourView& view,
                      std::span<const std::uint32_t> points, std::size_t intervals, PoseHypothesis& h,
                      NormalEquations& equations);
 
@@ -72,7 +72,7 @@ class HypothesisRefiner {
   const Camera& camera_;
   double map_sigma_m_;
   VisibleSet visible_;
-  std::vector<EventAlignment> alignments_;  ///< from a wide gate to the tracker's
+  std::deque<EventRegistration> registrations_;  ///< from a wide gate to the tracker's
   std::deque<Interval> intervals_;          ///< the newest last
   std::vector<ContourSample> samples_;
 };

@@ -8,17 +8,22 @@
 
 namespace evpose {
 
+namespace {
+
+constexpr double kTurns_s = 0.06;   // turns of gyroscope and estimate are compared over so long
+constexpr double kForces_s = 0.25;  // bends of the path by IMU and estimate are compared over so long
+// While the IMU's stamps are doubted, a smaller difference is a contradiction, by this factor.
+constexpr double kDoubtedShare = 0.6;
+constexpr double kDistrust_s = 1.0;  // so long after a contradiction the IMU is not relied on
+
+}  // namespace
+
 void describe(ConfigTable& table, ImuAgreementConfig& c) {
-  table.add("over_s", c.over_s, "s", "turns of gyroscope and estimate are compared over so long", {1e-3, 10});
-  table.add("forces_s", c.forces_s, "s", "bends of the path by IMU and estimate are compared over so long",
-            {1e-3, 10});
-  table.add("sigma", c.sigma, "", "a difference of so many standard deviations is a contradiction", {1, 1e9});
-  table.add("doubted_sigma", c.doubted_sigma, "", "... and of so many while the IMU's stamps are doubted",
-            {0.1, 1e9});
-  table.add("distrust_s", c.distrust_s, "s", "so long after it the IMU is not relied on", {0, 1000});
+  table.add("contradiction_sigma", c.contradiction_sigma, "",
+            "IMU and camera contradict each other at so many standard deviations", {1, 1e9});
 }
 
-void ImuAgreement::step(const ImuSample& a, const ImuSample& b, const FusionState& from,
+void ImuAgreement::add_step(const ImuSample& a, const ImuSample& b, const FusionState& from,
                         const Eigen::Vector3d& gravity_map, const ImuNoise& noise) {
   const ImuIncrement step = integrate(a, b, from.gyro_bias, from.accel_bias);
   now_.integral = (now_.integral * step.dq).normalized();
@@ -85,13 +90,13 @@ double ImuAgreement::judge(const FusionState& state, bool doubted) {
   now_.force_bias = state.accel_bias;
   now_.position_variance = worst(kP);
   now_.force_bias_variance = worst(kBa);
-  const Moment *turned = before(config_.over_s), *middle = before(0.5 * config_.forces_s),
-               *begin = before(config_.forces_s);
+  const Moment *turned = before(kTurns_s), *middle = before(0.5 * kForces_s),
+               *begin = before(kForces_s);
   const double sigmas = std::max(turned != nullptr ? turn_difference(*turned) : 0,
                                  begin != nullptr ? bend_difference(*begin, *middle) : 0);
-  if (!(sigmas <= (doubted ? config_.doubted_sigma : config_.sigma)))
-    distrust_until_ = state.t + from_seconds(config_.distrust_s);
-  const TimeNs since = state.t - from_seconds(std::max(config_.over_s, config_.forces_s));
+  if (!(sigmas <= config_.contradiction_sigma * (doubted ? kDoubtedShare : 1)))
+    distrust_until_ = state.t + from_seconds(kDistrust_s);
+  const TimeNs since = state.t - from_seconds(std::max(kTurns_s, kForces_s));
   while (first_ + 1 < past_.size() && past_[first_ + 1].t <= since) ++first_;
   if (2 * first_ > past_.size()) {
     past_.erase(past_.begin(), past_.begin() + static_cast<std::ptrdiff_t>(first_));

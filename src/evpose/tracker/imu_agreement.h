@@ -12,11 +12,7 @@ namespace evpose {
 class ConfigTable;
 
 struct ImuAgreementConfig {
-  double over_s = 0.06;        ///< turns are compared over so long ...
-  double forces_s = 0.25;      ///< ... and how the path bends over so long
-  double sigma = 2.5;          ///< a difference of so many standard deviations is a contradiction ...
-  double doubted_sigma = 1.5;  ///< ... and of so many while the stamps are doubted
-  double distrust_s = 1.0;     ///< so long after it the IMU is not relied on
+  double contradiction_sigma = 2.5;  ///< a difference of so many standard deviations is a contradiction
 };
 void describe(ConfigTable& table, ImuAgreementConfig& config);
 
@@ -28,10 +24,10 @@ class ImuAgreement {
  public:
   explicit ImuAgreement(const ImuAgreementConfig& config) : config_(config) {}
 
-  /// The estimate comes from elsewhere.
-  void forget() { past_.clear(), first_ = 0; }
+  /// The estimate comes from elsewhere: what was before does not count.
+  void restart() { past_.clear(), first_ = 0; }
   /// A step of the IMU from the estimate's time on, with the densities of its noise.
-  void step(const ImuSample& a, const ImuSample& b, const FusionState& from,
+  void add_step(const ImuSample& a, const ImuSample& b, const FusionState& from,
             const Eigen::Vector3d& gravity_map, const ImuNoise& noise);
   /// The estimate after an update, and whether the IMU's stamps are doubted. The difference in standard
   /// deviations; 0 while there is too little to tell.
@@ -63,8 +59,8 @@ class ImuAgreement {
 
   ImuAgreementConfig config_;
   Moment now_;
-  std::vector<Moment> past_;  ///< at the updates, in order of time; ...
-  std::size_t first_ = 0;     ///< ... from here on still asked for
+  std::vector<Moment> past_;  ///< at the updates, in order of time
+  std::size_t first_ = 0;     ///< of past_ that is still needed
   TimeNs distrust_until_ = 0;
 };
 

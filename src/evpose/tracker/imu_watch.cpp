@@ -11,11 +11,22 @@ namespace {
 
 constexpr std::array<const char*, 6> kAxes{"gyroscope x",     "gyroscope y",     "gyroscope z",
                                            "accelerometer x", "accelerometer y", "accelerometer z"};
-constexpr double kForget_s = 10;            // samples are taken at most so far ahead of their use
-constexpr double kRegular = 2;              // intervals up to so many usual ones teach the usual one
-constexpr double kLeastClip[] = {1, 15};    // rad/s, m/s^2: smaller readings are not taken as clipped
-constexpr double kLeastSpike[] = {0.3, 5};  // rad/s, m/s^2: smaller ones do no harm
-constexpr double kLearnChange = 0.02;       // share of a sample in the usual change
+constexpr double kGapPeriods = 3.5;    // an interval of so many usual ones is a gap
+constexpr double kRegular = 2;         // intervals up to so many usual ones teach the usual one
+constexpr int kClippedSamples = 4;     // so many equal readings at the largest value yet: saturated below its range
+constexpr int kStuckSamples = 12;      // so many equal readings of one axis while others change: stuck
+constexpr double kLeastClip[] = {1, 15};     // rad/s, m/s^2: smaller readings are not taken as clipped
+// A reading may be a spike if it is off the last one by so many usual changes, by more than a vehicle can do
+// in the time, and by enough to do harm. It is one if fewer than kSpikeSamples in a row are off: more are a
+// change of the motion.
+constexpr double kSpikeSigma = 8;
+constexpr double kSpikeRate[] = {300, 5e3};  // rad/s^2, m/s^3
+constexpr double kLeastSpike[] = {0.3, 5};   // rad/s, m/s^2
+constexpr int kSpikeSamples = 3;
+constexpr double kLearnChange = 0.02;  // share of a sample in the usual change
+constexpr double kDoubt_s = 0.5;       // stamps are doubted so long after a gap or a step back
+constexpr double kRemember_s = 0.05;   // a fault is reported so long after its last sign
+constexpr double kLongestLead_s = 10;  // samples are taken at most so far ahead of their use
 
 double& axis(ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 3]; }
 double axis(const ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 3]; }
@@ -23,26 +34,13 @@ double axis(const ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 
 }  // namespace
 
 void describe(ConfigTable& table, ImuWatchConfig& c) {
-  table.add("gap_periods", c.gap_periods, "", "an interval of so many usual ones is a gap", {1.5, 1e6});
   table.add("gyro_range_rad_s", c.gyro_range_rad_s, "rad/s", "readings from here on are saturated",
             {0.1, 1e6});
   table.add("accel_range_m_s2", c.accel_range_m_s2, "m/s^2", "readings from here on are saturated", {1, 1e6});
-  table.add("clipped_samples", c.clipped_samples, "", "equal largest readings that are saturation", {2, 1e6});
-  table.add("stuck_samples", c.stuck_samples, "", "equal readings of one axis that are a stuck sensor",
-            {3, 1e6});
-  table.add("spike_sigma", c.spike_sigma, "", "a reading so many usual changes off the last may be a spike",
-            {1, 1e6});
-  table.add("spike_gyro_rad_s2", c.spike_gyro_rad_s2, "rad/s^2",
-            "... if the rate has changed faster than this", {0, 1e9});
-  table.add("spike_accel_m_s3", c.spike_accel_m_s3, "m/s^3", "... or the force faster than this", {0, 1e9});
-  table.add("spike_samples", c.spike_samples, "", "readings off in a row that are a change of the motion",
-            {1, 1e6});
-  table.add("doubt_s", c.doubt_s, "s", "stamps are doubted so long after a gap or a step back", {0, 100});
-  table.add("remember_s", c.remember_s, "s", "a fault is told so long after its last sign", {0, 100});
 }
 
 void ImuWatch::tell(TimeNs t, std::string what, TimeNs until) {
-  while (!told_.empty() && to_seconds(t - told_.front().t) > kForget_s + config_.remember_s)
+  while (!told_.empty() && to_seconds(t - told_.front().t) > kLongestLead_s + kRemember_s)
     told_.pop_front();
   if (!told_.empty() && told_.back().t >= t) return;  // the first sign of one instant is kept
   told_.push_back({t, std::max(t, until), std::move(what)});
@@ -63,36 +61,37 @@ std::span<const CheckedImu> ImuWatch::take(const ImuSample& s) {
     return released_;
   }
   if (s.t <= last_.t) {
-    if (s.t < last_.t) doubt_ = "IMU time goes back", doubt_until_ = last_.t + from_seconds(config_.doubt_s);
+    if (s.t < last_.t) doubt_ = "IMU time goes back", doubt_until_ = last_.t + from_seconds(kDoubt_s);
     tell(last_.t, s.t < last_.t ? "IMU time goes back" : "IMU time stands still");
     return {};
   }
   Kept now{{s}};
   const double interval_s = to_seconds(s.t - last_.t);
   if (period_s_ == 0) period_s_ = interval_s;
-  if (interval_s > config_.gap_periods * period_s_) {
-    now.checked.suspect = true;
-    tell(last_.t + from_seconds(config_.gap_periods * period_s_), "IMU samples are missing", s.t);
+  if (interval_s > kGapPeriods * period_s_) {
+    now.checked.trust = ImuTrust::suspect;
+    tell(last_.t + from_seconds(kGapPeriods * period_s_), "IMU samples are missing", s.t);
     doubt_ = text("IMU gap of ", std::round(1e4 * interval_s) / 10, " ms");
-    doubt_until_ = s.t + from_seconds(config_.doubt_s);
+    doubt_until_ = s.t + from_seconds(kDoubt_s);
     // What comes after a gap tells nothing of what came before.
-    for (Kept& kept : kept_) kept.checked.suspect |= kept.any_off();
+    for (Kept& kept : kept_)
+      if (kept.any_off()) kept.checked.trust = ImuTrust::suspect;
     release();
   } else if (interval_s < kRegular * period_s_) {
     period_s_ += 0.05 * (interval_s - period_s_);
   }
-  mend(&now);
+  repair(&now);
   now.checked.doubted = s.t < doubt_until_;
   last_ = s;
   kept_.push_back(now);
   flatten_spikes();
-  const bool lasts = static_cast<int>(kept_.size()) >= config_.spike_samples;
+  const bool lasts = static_cast<int>(kept_.size()) >= kSpikeSamples;
   if (lasts || !kept_.back().any_off()) release();
   if (now.checked.doubted) tell(s.t, doubt_);
   return released_;
 }
 
-void ImuWatch::mend(Kept* now) {
+void ImuWatch::repair(Kept* now) {
   const ImuSample raw = now->checked.sample;
   const double since_good_s = to_seconds(raw.t - good_.t);
   int stuck = 0, stuck_at = -1;
@@ -102,29 +101,29 @@ void ImuWatch::mend(Kept* now) {
     const auto sensor = static_cast<std::size_t>(i / 3);
     const double value = axis(raw, i), magnitude = std::abs(value), change = value - axis(good_, i);
     equal_[k] = value == axis(last_, i) ? equal_[k] + 1 : 0;
-    if (equal_[k] + 1 >= config_.stuck_samples) ++stuck, stuck_at = i;
+    if (equal_[k] + 1 >= kStuckSamples) ++stuck, stuck_at = i;
     const double range = i < 3 ? config_.gyro_range_rad_s : config_.accel_range_m_s2;
-    const bool clipped = equal_[k] + 1 >= config_.clipped_samples && magnitude >= largest_[k] &&
+    const bool clipped = equal_[k] + 1 >= kClippedSamples && magnitude >= largest_[k] &&
                          magnitude > kLeastClip[sensor];
     const double usual = std::sqrt(mean_square_[sensor]);
     if (magnitude >= range || clipped) {
       axis(now->checked.sample, i) = axis(good_, i);
-      now->checked.suspect = true;
+      now->checked.trust = ImuTrust::suspect;
       tell(raw.t, text("IMU saturated: ", kAxes[k]));
     } else {
-      const double possible = (i < 3 ? config_.spike_gyro_rad_s2 : config_.spike_accel_m_s3) * since_good_s;
-      now->off[k] = std::abs(change) > std::max({config_.spike_sigma * usual, possible, kLeastSpike[sensor]});
+      const double possible = kSpikeRate[sensor] * since_good_s;
+      now->off[k] = std::abs(change) > std::max({kSpikeSigma * usual, possible, kLeastSpike[sensor]});
       if (!now->off[k]) largest_[k] = std::max(largest_[k], magnitude);
     }
     // A spike teaches no more than the least spike would.
-    const double lesson = usual > 0 ? std::min(std::abs(change), config_.spike_sigma * usual) : change;
+    const double lesson = usual > 0 ? std::min(std::abs(change), kSpikeSigma * usual) : change;
     square[sensor] += lesson * lesson / 3;
   }
   for (std::size_t sensor = 0; sensor < 2; ++sensor)
     mean_square_[sensor] += kLearnChange * (square[sensor] - mean_square_[sensor]);
   if (stuck == 0 || stuck == 6) return;
   tell(raw.t, text("IMU stuck: ", kAxes[static_cast<std::size_t>(stuck_at)]));
-  now->checked.suspect = true;
+  now->checked.trust = ImuTrust::suspect;
 }
 
 void ImuWatch::flatten_spikes() {
@@ -138,7 +137,7 @@ void ImuWatch::flatten_spikes() {
       const double share = to_seconds(kept.checked.sample.t - good_.t) / span_s;
       axis(kept.checked.sample, i) =
           axis(good_, i) + share * (axis(newest.checked.sample, i) - axis(good_, i));
-      kept.checked.suspect = true;
+      kept.checked.trust = ImuTrust::suspect;
       kept.off[k] = false;
       tell(kept.checked.sample.t, text("IMU spike: ", kAxes[k]));
     }
@@ -158,7 +157,7 @@ void ImuWatch::release() {
 
 std::string ImuWatch::fault(TimeNs t) const {
   for (auto told = told_.rbegin(); told != told_.rend(); ++told)
-    if (told->t <= t) return to_seconds(t - told->until) <= config_.remember_s ? told->what : "";
+    if (told->t <= t) return to_seconds(t - told->until) <= kRemember_s ? told->what : "";
   return "";
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "evpose/fusion/state_propagator.h"
 #include "evpose/imu/imu.h"
 
 namespace evpose {
@@ -14,17 +15,8 @@ namespace evpose {
 class ConfigTable;
 
 struct ImuWatchConfig {
-  double gap_periods = 3.5;         ///< an interval of so many usual ones is a gap
   double gyro_range_rad_s = 34.9;   ///< readings from here on are saturated: 2000 deg/s
-  double accel_range_m_s2 = 156.9;  ///< 16 g
-  int clipped_samples = 4;  ///< so many equal readings at the largest value yet: saturated below its range
-  int stuck_samples = 12;   ///< so many equal readings of one axis while others change: stuck
-  double spike_sigma = 8;   ///< a reading so many usual changes off the last may be a spike ...
-  double spike_gyro_rad_s2 = 300;  ///< ... if the rate has changed faster than this, ...
-  double spike_accel_m_s3 = 5e3;   ///< ... or the force; it is one if fewer than ...
-  int spike_samples = 3;           ///< ... so many in a row are off: these are a change of the motion
-  double doubt_s = 0.5;            ///< stamps are doubted so long after a gap or a step back
-  double remember_s = 0.05;        ///< a fault is told so long after its last sign
+  double accel_range_m_s2 = 156.9;  ///< readings from here on are saturated: 16 g
 };
 void describe(ConfigTable& table, ImuWatchConfig& config);
 
@@ -32,9 +24,9 @@ void describe(ConfigTable& table, ImuWatchConfig& config);
 /// them.
 struct CheckedImu {
   ImuSample sample;
-  bool suspect = false;  ///< its reading, or the time since the one before, is not to be relied on
+  /// Of its reading; suspect also if the time since the one before is too long; none: there is no such sample.
+  ImuTrust trust = ImuTrust::good;
   bool doubted = false;  ///< its stamp may be wrong
-  bool missing = false;  ///< there is no such sample
 };
 
 /// Looks at each IMU sample before it is used and names what is wrong with the stream.
@@ -44,7 +36,7 @@ class ImuWatch {
 
   /// The samples that may be used now, in order of time; valid until the next call. None for a sample that
   /// cannot be used: not finite, or its time does not advance. One that may hold a spike is kept back until
-  /// those after it tell (fewer than spike_samples), so that a hard change of the motion passes as it is.
+  /// those after it tell (fewer than kSpikeSamples), so that a hard change of the motion passes as it is.
   std::span<const CheckedImu> take(const ImuSample& sample);
 
   /// What is wrong at time t by the samples up to then, in words; empty if nothing is. Later samples may have
@@ -60,7 +52,7 @@ class ImuWatch {
     bool any_off() const;
   };
   /// Names and replaces what is saturated or stuck; finds what is too far off.
-  void mend(Kept* now);
+  void repair(Kept* now);
   /// Spikes are what was off and, by the newest sample, did not last.
   void flatten_spikes();
   void release();

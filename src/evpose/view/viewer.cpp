@@ -156,7 +156,7 @@ void Viewer::draw(const Tracker& tracker, const Update& u) {
 namespace {
 
 /// Of the paper's field at a projected point: 0 where an event has just been, 1 where none was for long.
-float residual_at(const TimeSurface& surface, const Tracker::Snapshot::Point& p, std::uint32_t now_us) {
+float residual_at(const TimeSurface& surface, const Snapshot::Point& p, std::uint32_t now_us) {
   const Eigen::Vector2d pixel(static_cast<double>(p.x), static_cast<double>(p.y));
   return static_cast<float>(
       1 - sample_field(surface, pixel, now_us, 1e6 * kDecay_s, FieldKernel::bilinear).value);
@@ -165,7 +165,8 @@ float residual_at(const TimeSurface& surface, const Tracker::Snapshot::Point& p,
 }  // namespace
 
 std::string picture_of(const Tracker& tracker, TimeNs t, double t_s) {
-  const TimeSurface& surface = tracker.events().surface();
+  EVPOSE_CHECK(tracker.events().surface() != nullptr);
+  const TimeSurface& surface = *tracker.events().surface();
   const std::uint32_t now_us = tracker.events().stamp(t);
   const int step = (surface.width() + kWidest - 1) / kWidest;
   const int width = surface.width() / step, height = surface.height() / step;

@@ -27,7 +27,7 @@ constexpr std::array<Kind, 6> kKinds{{{EventVerdict::elsewhere, "#c9ccd1", "near
 struct Drawn {
   std::vector<FrontEvent> events;
   std::vector<EventVerdict> verdicts;
-  std::vector<Tracker::Snapshot::Point> points;
+  std::vector<Snapshot::Point> points;
 };
 
 /// The first update at or after `at_s` of the run.

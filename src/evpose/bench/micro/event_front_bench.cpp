@@ -86,7 +86,7 @@ struct Pass {
   Pass() : filter(1280, 720, {}), surface(1280, 720) { filter.set_motion(200); }
   void take(std::int64_t t_us, int x, int y, bool on) {
     const auto stamp = static_cast<std::uint32_t>(t_us + 1);
-    if (filter.keep(x, y, on, stamp)) surface.insert(x, y, on ? Polarity::on : Polarity::off, stamp, 5000);
+    if (filter.keep(x, y, stamp)) surface.insert(x, y, on ? Polarity::on : Polarity::off, stamp);
   }
   NoiseFilter filter;
   TimeSurface surface;

@@ -30,7 +30,7 @@ void update(benchmark::State& state) {
   const double rate = 1e6 * static_cast<double>(state.range(2));
   TrackerConfig config;
   config.rate_hz = kRate_hz;
-  config.field = state.range(3) == 0 ? FieldKind::events : FieldKind::exponential;
+  config.registration = state.range(3) == 0 ? RegistrationKind::events : RegistrationKind::temporal_field;
   // The random load must not move the pose, nor start a search for it; all stages run all the same.
   config.health.gate = -1;
   config.relocalization.on = false;
@@ -75,7 +75,7 @@ void update(benchmark::State& state) {
   state.counters["pose_p99_ms"] = quantile_ms(all, 0.99);
 }
 BENCHMARK(update)
-    ->ArgNames({"width", "height", "Mev_s_in", "exponential"})
+    ->ArgNames({"width", "height", "Mev_s_in", "temporal_field"})
     ->Args({640, 480, 2, 0})
     ->Args({640, 480, 2, 1})
     ->Args({1280, 720, 2, 0})

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/tracker/contour_view.h"
+#include "evpose/registration/contour_view.h"
 
 #include <cstddef>
 
@@ -13,7 +13,7 @@ void fetch(const ContourView& view, std::uint32_t point) {
   const char* at = reinterpret_cast<const char*>(&view.map.points[point]);
   __builtin_prefetch(at);
   __builtin_prefetch(at + offsetof(ContourPoint, sigma));
-  __builtin_prefetch(&view.pieces.of_point[point]);
+  __builtin_prefetch(&view.segments.of_point[point]);
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ void project_contours(const ContourView& view, std::span<const std::uint32_t> po
     s.jacobian.head<3>() = (A * R_body_map).transpose();
     s.jacobian.tail<3>() = x_body.cross(A.transpose());
     s.map_sigma_px = (point.sigma > 0 ? point.sigma : view.map_sigma_m) * across.norm();
-    s.piece = view.pieces.of_point[i];
+    s.segment = view.segments.of_point[i];
     s.point = i;
     s.flow_px_s = flow.norm();
     s.depth_m = x_cam.norm();

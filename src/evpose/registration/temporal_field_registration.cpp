@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/registration/registration.h"
+#include "evpose/registration/temporal_field_registration.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "evpose/core/config.h"
@@ -28,7 +29,7 @@ struct NormalEquations {
   }
 };
 
-NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationConfig& config,
+NormalEquations accumulate(const FieldProblem& problem, const TemporalFieldConfig& config,
                            const Pose& T_map_body, ThreadPool& pool) {
   const std::size_t n = problem.points.size();
   std::vector<NormalEquations> partial(ThreadPool::chunks(n, kChunk));
@@ -56,12 +57,12 @@ NormalEquations accumulate(const AlignmentProblem& problem, const RegistrationCo
   return sum;
 }
 
-double information_scale(const RegistrationConfig& c) {
+double information_scale(const TemporalFieldConfig& c) {
   return 1 / (c.noise * c.noise * c.correlated_points);
 }
 
-void fill(const AlignmentProblem& problem, double scale, const NormalEquations& normal,
-          AlignmentResult* result) {
+void fill(const FieldProblem& problem, double scale, const NormalEquations& normal,
+          FieldSolution* result) {
   result->information = scale * normal.H;
   result->vector =
       scale * normal.b + result->information * result->T_map_body.minus(problem.T_map_body_predicted);
@@ -72,26 +73,18 @@ void fill(const AlignmentProblem& problem, double scale, const NormalEquations& 
 
 }  // namespace
 
-void describe(ConfigTable& table, RegistrationConfig& c) {
-  table.add("solver", c.solver, {{"gauss_newton", Solver::gauss_newton}, {"ceres", Solver::ceres}},
-            "minimiser; ceres is the slow reference");
+void describe(ConfigTable& table, TemporalFieldConfig& c) {
   table.add("kernel", c.kernel, {{"bilinear", FieldKernel::bilinear}, {"spline", FieldKernel::spline}},
             "field between pixels");
   table.add("decay_px", c.decay_px, "px",
             "time constant of the field, as predicted motion across the contour", {0.05, 100});
   table.add("decay_min_s", c.decay_min_s, "s", "shortest time constant", {1e-4, 10});
   table.add("decay_max_s", c.decay_max_s, "s", "longest time constant", {1e-4, 10});
-  table.add("robust_scale", c.robust_scale, "", "residual (0..1) beyond which Tukey's loss is flat",
-            {0.01, 100});
   table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
-  table.add("max_iterations", c.max_iterations, "", "most iterations of the minimiser", {1, 100});
-  table.add("converged_px", c.converged_px, "px", "a smaller step ends the iteration", {1e-6, 10});
-  table.add("noise", c.noise, "", "1 sigma of a residual at the optimum", {0.01, 100});
-  table.add("correlated_points", c.correlated_points, "", "so many points share one error", {1, 1e6});
 }
 
-bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const Pose& T_map_body,
-                    const AlignmentPoint& point, double* residual, Vector6d* jacobian) {
+bool evaluate_point(const FieldProblem& problem, FieldKernel kernel, const Pose& T_map_body,
+                    const FieldPoint& point, double* residual, Vector6d* jacobian) {
   const Eigen::Matrix3d R_body_map = T_map_body.q.conjugate().toRotationMatrix();
   const Eigen::Vector3d x_body = R_body_map * (point.position_map - T_map_body.p);
   const Pose T_cam_body = problem.T_body_cam.inverse();
@@ -114,9 +107,8 @@ bool evaluate_point(const AlignmentProblem& problem, FieldKernel kernel, const P
   return true;
 }
 
-AlignmentResult align(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool) {
-  if (config.solver == Solver::ceres) return align_ceres(problem, config);
-  AlignmentResult result;
+FieldSolution minimise(const FieldProblem& problem, const TemporalFieldConfig& config, ThreadPool& pool) {
+  FieldSolution result;
   Pose pose = problem.T_map_body_predicted;
   const double scale = information_scale(config);
   const auto total_cost = [&](const NormalEquations& n, const Pose& at) {
@@ -152,9 +144,32 @@ AlignmentResult align(const AlignmentProblem& problem, const RegistrationConfig&
   return result;
 }
 
-void evaluate_information(const AlignmentProblem& problem, const RegistrationConfig& config, ThreadPool& pool,
-                          AlignmentResult* result) {
+void evaluate_information(const FieldProblem& problem, const TemporalFieldConfig& config, ThreadPool& pool,
+                          FieldSolution* result) {
   fill(problem, information_scale(config), accumulate(problem, config, result->T_map_body, pool), result);
+}
+
+RegistrationResult TemporalFieldRegistration::measure(const RegistrationProblem& p) {
+  EVPOSE_CHECK(p.surface != nullptr && p.view != nullptr);
+  points_.clear();
+  for (const ContourSample& s : p.samples) {
+    const double decay_s =
+        std::clamp(config_.decay_px / std::max(std::abs(s.speed_px_s), 1e-9), config_.decay_min_s,
+                   std::max(config_.decay_min_s, config_.decay_max_s));
+    points_.push_back({p.view->map.position(s.point), 1e6 * decay_s});
+  }
+  const Matrix6d prior = p.pose_covariance.ldlt().solve(Matrix6d::Identity());
+  const FieldProblem problem{*p.surface, p.view->camera, p.view->T_body_cam, points_,
+                             p.now_us,   p.T_map_body,   prior};
+  const FieldSolution solution = minimise(problem, config_, pool_);
+  RegistrationResult result;
+  result.information = solution.information;
+  result.vector = solution.vector;
+  result.residual = std::sqrt(solution.cost);
+  result.points = solution.seen;
+  result.inliers = solution.matched;
+  result.converged = solution.converged;
+  return result;
 }
 
 }  // namespace evpose

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/registration/registration.h"
+#include "evpose/registration/temporal_field_registration.h"
 
 #include <gtest/gtest.h>
 
@@ -7,15 +7,17 @@
 #include <cmath>
 #include <random>
 
+#include "evpose/registration/test_temporal_field_ceres.h"
+
 namespace evpose {
 namespace {
 
 constexpr std::uint32_t kNow = 1'000'000;
 
 /// The contours of a box seen by a camera, and the surface that their motion leaves behind.
-class AlignmentLaws : public ::testing::Test {
+class TemporalFieldLaws : public ::testing::Test {
  protected:
-  AlignmentLaws() {
+  TemporalFieldLaws() {
     camera_ = std::move(make_camera({300, 300, 160, 120, "none", {}, {320, 240}})).value();
     T_body_cam_ = {so3::exp({0.1, -0.2, 0.05}), {0.05, 0.02, -0.01}};
     truth_ = Pose{so3::exp({0.2, 0.1, -0.3}), {0.5, -0.2, 0.3}};
@@ -49,12 +51,12 @@ class AlignmentLaws : public ::testing::Test {
           const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
           if (x < 0 || y < 0 || x >= 320 || y >= 240) continue;
           surface_.insert(x, y, i % 2 == 0 ? Polarity::on : Polarity::off,
-                          kNow - static_cast<std::uint32_t>(1500 * ring), 1000);
+                          kNow - static_cast<std::uint32_t>(1500 * ring));
         }
       }
   }
 
-  AlignmentProblem problem(const Pose& predicted, const Matrix6d& prior) const {
+  FieldProblem problem(const Pose& predicted, const Matrix6d& prior) const {
     return {surface_, *camera_, T_body_cam_, points_, kNow, predicted, prior};
   }
 
@@ -66,12 +68,12 @@ class AlignmentLaws : public ::testing::Test {
 
   std::shared_ptr<const Camera> camera_;
   Pose T_body_cam_, truth_;
-  std::vector<AlignmentPoint> points_;
+  std::vector<FieldPoint> points_;
   std::vector<Eigen::Vector3d> cam_;
   std::vector<Eigen::Vector2d> normals_;  ///< across the projected lines
   TimeSurface surface_{320, 240};
-  static RegistrationConfig confident() {
-    RegistrationConfig config;
+  static TemporalFieldConfig confident() {
+    TemporalFieldConfig config;
     config.correlated_points = 1;
     config.robust_scale = 2;
     config.max_iterations = 60;
@@ -81,9 +83,9 @@ class AlignmentLaws : public ::testing::Test {
   Matrix6d loose_ = 1e-2 * Matrix6d::Identity();
 };
 
-TEST_F(AlignmentLaws, JacobianMatchesDifferences) {
+TEST_F(TemporalFieldLaws, JacobianMatchesDifferences) {
   const Pose at = off(truth_);
-  const AlignmentProblem p = problem(at, loose_);
+  const FieldProblem p = problem(at, loose_);
   int compared = 0;
   for (const auto& point : points_) {
     double r = 0;
@@ -102,9 +104,9 @@ TEST_F(AlignmentLaws, JacobianMatchesDifferences) {
   EXPECT_GT(compared, 400);
 }
 
-TEST_F(AlignmentLaws, FindsThePoseTheEventsWereDrawnFrom) {
+TEST_F(TemporalFieldLaws, FindsThePoseTheEventsWereDrawnFrom) {
   ThreadPool pool(1);
-  const AlignmentResult r = align(problem(off(truth_), loose_), confident(), pool);
+  const FieldSolution r = minimise(problem(off(truth_), loose_), confident(), pool);
   // Events sit on whole pixels, so the poses may differ where the points' images hardly do.
   const auto mean_offset_px = [&](const Pose& pose) {
     double sum = 0;
@@ -119,44 +121,44 @@ TEST_F(AlignmentLaws, FindsThePoseTheEventsWereDrawnFrom) {
   EXPECT_GT(r.matched, 0.9 * r.seen);
 }
 
-TEST_F(AlignmentLaws, BothSolversFindTheSameMinimum) {
+TEST_F(TemporalFieldLaws, BothSolversFindTheSameMinimum) {
   ThreadPool pool(1);
   const Pose predicted = off(truth_);
-  const AlignmentProblem p = problem(predicted, loose_);
-  const AlignmentResult ours = align(p, confident(), pool), reference = align_ceres(p, confident());
+  const FieldProblem p = problem(predicted, loose_);
+  const FieldSolution ours = minimise(p, confident(), pool), reference = minimise_with_ceres(p, confident());
   const Vector6d d = ours.T_map_body.minus(reference.T_map_body);
   EXPECT_LT(d.head<3>().norm(), 1e-4);
   EXPECT_LT(d.tail<3>().norm(), 3e-5);
   EXPECT_LE(ours.cost, reference.cost * 1.0005);
 }
 
-TEST_F(AlignmentLaws, AnyNumberOfThreadsGivesTheSameBits) {
+TEST_F(TemporalFieldLaws, AnyNumberOfThreadsGivesTheSameBits) {
   ThreadPool one(1), three(3);
   const Pose predicted = off(truth_);
-  const AlignmentProblem p = problem(predicted, loose_);
-  const AlignmentResult a = align(p, {}, one), b = align(p, {}, three);
+  const FieldProblem p = problem(predicted, loose_);
+  const FieldSolution a = minimise(p, {}, one), b = minimise(p, {}, three);
   EXPECT_EQ(a.T_map_body.p, b.T_map_body.p);
   EXPECT_EQ(a.T_map_body.q.coeffs(), b.T_map_body.q.coeffs());
   EXPECT_EQ(a.information, b.information);
 }
 
-TEST_F(AlignmentLaws, AStrongPriorHoldsThePredictionAndNoEventsChangeNothing) {
+TEST_F(TemporalFieldLaws, AStrongPriorHoldsThePredictionAndNoEventsChangeNothing) {
   ThreadPool pool(1);
   const Pose predicted = off(truth_);
-  const AlignmentResult held = align(problem(predicted, 1e14 * Matrix6d::Identity()), {}, pool);
+  const FieldSolution held = minimise(problem(predicted, 1e14 * Matrix6d::Identity()), {}, pool);
   EXPECT_LT(held.T_map_body.minus(predicted).norm(), 1e-8);
   const TimeSurface empty(320, 240);
-  const AlignmentProblem p{empty, *camera_, T_body_cam_, points_, kNow, predicted, loose_};
-  const AlignmentResult blind = align(p, {}, pool);
+  const FieldProblem p{empty, *camera_, T_body_cam_, points_, kNow, predicted, loose_};
+  const FieldSolution blind = minimise(p, {}, pool);
   EXPECT_EQ(blind.matched, 0);
   EXPECT_EQ(blind.information, Matrix6d::Zero());
   EXPECT_LT(blind.T_map_body.minus(predicted).norm(), 1e-12);
 }
 
-TEST_F(AlignmentLaws, InformationAndVectorPointFromThePredictionToTheMinimum) {
+TEST_F(TemporalFieldLaws, InformationAndVectorPointFromThePredictionToTheMinimum) {
   ThreadPool pool(1);
   const Pose predicted = off(truth_);
-  const AlignmentResult r = align(problem(predicted, loose_), confident(), pool);
+  const FieldSolution r = minimise(problem(predicted, loose_), confident(), pool);
   // At the joint minimum the gradient vanishes: information d - vector + prior d = 0.
   const Vector6d d = r.T_map_body.minus(predicted);
   const Vector6d gradient = r.information * d - r.vector + loose_ * d;
@@ -166,7 +168,7 @@ TEST_F(AlignmentLaws, InformationAndVectorPointFromThePredictionToTheMinimum) {
 TEST(TemporalField, DecayAtOneTimeConstantIsOneOverE) {
   TimeSurface surface(20, 20);
   for (int y = 0; y < 20; ++y)
-    for (int x = 0; x < 20; ++x) surface.insert(x, y, Polarity::on, 4000, 1);
+    for (int x = 0; x < 20; ++x) surface.insert(x, y, Polarity::on, 4000);
   for (FieldKernel kernel : {FieldKernel::bilinear, FieldKernel::spline}) {
     const FieldSample s = sample_field(surface, {8.3, 9.7}, 9000, 5000, kernel);
     EXPECT_NEAR(s.value, std::exp(-1), 1e-6);
@@ -176,8 +178,8 @@ TEST(TemporalField, DecayAtOneTimeConstantIsOneOverE) {
 
 TEST(TemporalField, NewerPolarityWins) {
   TimeSurface surface(20, 20);
-  surface.insert(5, 5, Polarity::on, 1000, 1);
-  surface.insert(5, 5, Polarity::off, 2000, 1);
+  surface.insert(5, 5, Polarity::on, 1000);
+  surface.insert(5, 5, Polarity::off, 2000);
   EXPECT_NEAR(sample_field(surface, {5, 5}, 3000, 1000, FieldKernel::bilinear).value, std::exp(-1), 1e-6);
 }
 
@@ -186,7 +188,7 @@ TEST(TemporalField, GradientMatchesDifferences) {
   TimeSurface surface(30, 30);
   for (int i = 0; i < 400; ++i)
     surface.insert(static_cast<int>(random() % 30), static_cast<int>(random() % 30), Polarity::on,
-                   static_cast<std::uint32_t>(random() % 10000 + 1), 1);
+                   static_cast<std::uint32_t>(random() % 10000 + 1));
   for (FieldKernel kernel : {FieldKernel::bilinear, FieldKernel::spline})
     for (const Eigen::Vector2d& u :
          {Eigen::Vector2d(10.3, 12.6), Eigen::Vector2d(3.5, 25.2), Eigen::Vector2d(0.4, 28.7)}) {
@@ -202,8 +204,8 @@ TEST(TemporalField, GradientMatchesDifferences) {
 
 TEST(TemporalField, SplineIsContinuousAcrossPixelCentres) {
   TimeSurface surface(20, 20);
-  surface.insert(9, 9, Polarity::on, 5000, 1);
-  surface.insert(10, 9, Polarity::on, 3000, 1);
+  surface.insert(9, 9, Polarity::on, 5000);
+  surface.insert(10, 9, Polarity::on, 3000);
   const FieldSample a = sample_field(surface, {9 - 1e-9, 9.2}, 6000, 2000, FieldKernel::spline);
   const FieldSample b = sample_field(surface, {9 + 1e-9, 9.2}, 6000, 2000, FieldKernel::spline);
   EXPECT_NEAR(a.value, b.value, 1e-7);

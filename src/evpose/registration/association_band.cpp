@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/registration/strip_index.h"
+#include "evpose/registration/association_band.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@ constexpr float kSameDirectionCos = 0.98F;
 constexpr float kSameLine_px = 0.75F;
 constexpr float kFarther = 1e6F;
 
-bool same_line(const Strip& a, const Strip& b) {
+bool same_line(const AssociationBand& a, const AssociationBand& b) {
   return std::abs(a.nx * b.nx + a.ny * b.ny) > kSameDirectionCos &&
          std::abs(a.nx * (b.x - a.x) + a.ny * (b.y - a.y)) < kSameLine_px;
 }
@@ -25,24 +25,24 @@ float inverse(float v) { return std::abs(v) > 1 / kFarther ? 1 / v : kFarther; }
 
 }  // namespace
 
-StripIndex::StripIndex(ImageSize size, double half_length_px, double ambiguity_px)
+AssociationIndex::AssociationIndex(ImageSize size, double half_length_px, double ambiguity_px)
     : columns_((size.width + kCell_px - 1) / kCell_px),
       rows_((size.height + kCell_px - 1) / kCell_px),
       half_length_(static_cast<float>(half_length_px)),
       ambiguity_(static_cast<float>(ambiguity_px)),
       heads_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
 
-void StripIndex::build(std::span<const Strip> strips, float span_us) {
-  strips_.assign(strips.begin(), strips.end());
-  strips_.push_back({0, 0, 0, 0, 0, 0, -1});
-  entries_.assign(1, {static_cast<std::int32_t>(strips.size()), 0});
+void AssociationIndex::build(std::span<const AssociationBand> bands, float span_us) {
+  bands_.assign(bands.begin(), bands.end());
+  bands_.push_back({0, 0, 0, 0, 0, 0, -1});
+  entries_.assign(1, {static_cast<std::int32_t>(bands.size()), 0});
   std::fill(heads_.begin(), heads_.end(), 0);
-  for (std::size_t i = 0; i < strips.size(); ++i) enter(static_cast<std::int32_t>(i), span_us);
+  for (std::size_t i = 0; i < bands.size(); ++i) enter(static_cast<std::int32_t>(i), span_us);
 }
 
-/// Into every cell that the strip touches during the span.
-void StripIndex::enter(std::int32_t number, float span_us) {
-  const Strip& s = strips_[static_cast<std::size_t>(number)];
+/// Into every cell that the band touches during the span.
+void AssociationIndex::enter(std::int32_t number, float span_us) {
+  const AssociationBand& s = bands_[static_cast<std::size_t>(number)];
   const float half_us = 0.5F * span_us, middle = -(s.speed - s.curvature * half_us) * half_us;
   // In units of cells, whose centres are at whole numbers; a cell is met when its centre is within the
   // rectangle grown by the cell's own extent.
@@ -71,13 +71,13 @@ void StripIndex::enter(std::int32_t number, float span_us) {
   }
 }
 
-StripIndex::Owner StripIndex::find(float x, float y, float age_us) const {
+AssociationIndex::Owner AssociationIndex::find(float x, float y, float age_us) const {
   Owner nearest;
   Hit hits[kMostHits];
   int n = 0;
   for (std::int32_t k = heads_[cell_of(x, y)]; k > 0; k = entries_[static_cast<std::size_t>(k)].next) {
-    const std::int32_t number = entries_[static_cast<std::size_t>(k)].strip;
-    const Strip& s = strips_[static_cast<std::size_t>(number)];
+    const std::int32_t number = entries_[static_cast<std::size_t>(k)].band;
+    const AssociationBand& s = bands_[static_cast<std::size_t>(number)];
     const float dx = x - s.x, dy = y - s.y, along = std::abs(s.nx * dy - s.ny * dx);
     const float d = s.nx * dx + s.ny * dy + (s.speed - s.curvature * age_us) * age_us;
     if (along > half_length_ || std::abs(d) > s.reach) continue;
@@ -85,10 +85,10 @@ StripIndex::Owner StripIndex::find(float x, float y, float age_us) const {
     if (n == 0 || std::abs(d) < std::abs(nearest.distance)) nearest = {number, d};
     hits[n++] = {number, d, along};
   }
-  return n < 2 ? nearest : settle(nearest, {hits, static_cast<std::size_t>(n)});
+  return n < 2 ? nearest : resolve(nearest, {hits, static_cast<std::size_t>(n)});
 }
 
-void StripIndex::find_all(std::span<const FrontEvent> events, std::uint32_t now_us,
+void AssociationIndex::find_all(std::span<const FrontEvent> events, std::uint32_t now_us,
                           std::vector<Found>* found) {
   // Most events are far from any contour: written in any case and kept by counting, as a branch would be
   // guessed wrong.
@@ -103,7 +103,7 @@ void StripIndex::find_all(std::span<const FrontEvent> events, std::uint32_t now_
     find_eight(events, {&close_[begin], std::min(kSide, count - begin)}, now_us, found);
 }
 
-void StripIndex::find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
+void AssociationIndex::find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
                             std::uint32_t now_us, std::vector<Found>* found) const {
   std::array<std::size_t, kSide> entry{};
   Floats x{}, y{}, age{};
@@ -115,24 +115,24 @@ void StripIndex::find_eight(std::span<const FrontEvent> events, std::span<const 
   Floats least = Floats{} + kFarther, distance{};
   Ints owner = Ints{} - 1, hits{};
   for (std::size_t going = 1; going > 0;) {
-    std::array<const Strip*, kSide> strip;
+    std::array<const AssociationBand*, kSide> band;
     Ints number;
     going = 0;
     for (std::size_t l = 0; l < kSide; ++l) {
       const Entry& e = entries_[entry[l]];
-      number[l] = e.strip;
-      strip[l] = &strips_[static_cast<std::size_t>(e.strip)];
+      number[l] = e.band;
+      band[l] = &bands_[static_cast<std::size_t>(e.band)];
       going |= entry[l] = static_cast<std::size_t>(e.next);
     }
-    const auto all = [&](float Strip::*m) {
-      return Floats{strip[0]->*m, strip[1]->*m, strip[2]->*m, strip[3]->*m,
-                    strip[4]->*m, strip[5]->*m, strip[6]->*m, strip[7]->*m};
+    const auto all = [&](float AssociationBand::*m) {
+      return Floats{band[0]->*m, band[1]->*m, band[2]->*m, band[3]->*m,
+                    band[4]->*m, band[5]->*m, band[6]->*m, band[7]->*m};
     };
-    const Floats dx = x - all(&Strip::x), dy = y - all(&Strip::y), nx = all(&Strip::nx), ny = all(&Strip::ny);
+    const Floats dx = x - all(&AssociationBand::x), dy = y - all(&AssociationBand::y), nx = all(&AssociationBand::nx), ny = all(&AssociationBand::ny);
     const Floats t = nx * dy - ny * dx, along = t < 0 ? -t : t;
-    const Floats d = nx * dx + ny * dy + (all(&Strip::speed) - all(&Strip::curvature) * age) * age;
+    const Floats d = nx * dx + ny * dy + (all(&AssociationBand::speed) - all(&AssociationBand::curvature) * age) * age;
     const Floats across = d < 0 ? -d : d;
-    const Ints hit = (along <= half_length_) & (across <= all(&Strip::reach));
+    const Ints hit = (along <= half_length_) & (across <= all(&AssociationBand::reach));
     const Ints nearer = hit & (across < least);
     least = nearer ? across : least;
     distance = nearer ? d : distance;
@@ -142,17 +142,17 @@ void StripIndex::find_eight(std::span<const FrontEvent> events, std::span<const 
   for (std::size_t l = 0; l < which.size(); ++l) {
     if (hits[l] == 0) continue;
     const Owner one = hits[l] == 1 ? Owner{owner[l], distance[l]} : find(x[l], y[l], age[l]);
-    if (one.strip >= 0) found->push_back({which[l], one});
+    if (one.band >= 0) found->push_back({which[l], one});
   }
 }
 
-StripIndex::Owner StripIndex::settle(const Owner& nearest, std::span<const Hit> hits) const {
-  const Strip& line = strips_[static_cast<std::size_t>(nearest.strip)];
+AssociationIndex::Owner AssociationIndex::resolve(const Owner& nearest, std::span<const Hit> hits) const {
+  const AssociationBand& line = bands_[static_cast<std::size_t>(nearest.band)];
   Owner owner = nearest;
   float least = kFarther;
   for (const Hit& h : hits) {
-    if (h.strip == nearest.strip || same_line(line, strips_[static_cast<std::size_t>(h.strip)])) {
-      if (h.along < least) least = h.along, owner = {h.strip, h.distance};
+    if (h.band == nearest.band || same_line(line, bands_[static_cast<std::size_t>(h.band)])) {
+      if (h.along < least) least = h.along, owner = {h.band, h.distance};
     } else if (std::abs(h.distance) - std::abs(nearest.distance) < ambiguity_) {
       return {};
     }

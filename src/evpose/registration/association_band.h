@@ -12,26 +12,26 @@ namespace evpose {
 
 /// The part of the image that one contour sample answers for: a rectangle across the contour that moves with
 /// it. An event at e of age a has the signed distance n.(e - x) + speed a - curvature a^2 from the contour.
-struct alignas(32) Strip {
+struct alignas(32) AssociationBand {
   float x, y;              ///< centre at the time of the update, px
   float nx, ny;            ///< unit normal of the contour
   float speed, curvature;  ///< px/us, px/us^2
   float reach;             ///< largest distance, px
 };
 
-/// Finds the strip that an event belongs to, at the event's own time. Among strips of one line that is the
+/// Finds the band that an event belongs to, at the event's own time. Among bands of one line that is the
 /// nearest along it; among those of several lines the nearest across, or none when two are similarly near.
-/// Built anew for each update, as strips move; the cost goes with strips and events, not with the image.
-class StripIndex {
+/// Built anew for each update, as bands move; the cost goes with bands and events, not with the image.
+class AssociationIndex {
  public:
-  /// `half_length_px`: of a strip, along the contour.
-  StripIndex(ImageSize size, double half_length_px, double ambiguity_px);
+  /// `half_length_px`: of a band, along the contour.
+  AssociationIndex(ImageSize size, double half_length_px, double ambiguity_px);
 
-  /// Forgets all earlier strips. `span_us`: age of the oldest event that will be asked for.
-  void build(std::span<const Strip> strips, float span_us);
+  /// Forgets all earlier bands. `span_us`: age of the oldest event that will be asked for.
+  void build(std::span<const AssociationBand> bands, float span_us);
 
   struct Owner {
-    std::int32_t strip = -1;  ///< -1: none
+    std::int32_t band = -1;  ///< -1: none
     float distance = 0;       ///< signed, px
   };
   /// Position inside the image.
@@ -41,22 +41,22 @@ class StripIndex {
     std::uint32_t event;
     Owner owner;
   };
-  /// The events that a strip owns, in their order; `now_us`: of the strips, on the events' clock. As find()
+  /// The events that a band owns, in their order; `now_us`: of the bands, on the events' clock. As find()
   /// for each, eight side by side, which differs by rounding.
   void find_all(std::span<const FrontEvent> events, std::uint32_t now_us, std::vector<Found>* found);
 
  private:
-  static constexpr int kCell_px = 8, kMostHits = 16;  // more than so many strips at one place are a tangle
+  static constexpr int kCell_px = 8, kMostHits = 16;  // more than so many bands at one place are a tangle
   struct Hit {
-    std::int32_t strip;
+    std::int32_t band;
     float distance, along;
   };
   struct Entry {
-    std::int32_t strip, next;
+    std::int32_t band, next;
   };
   void find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
                   std::uint32_t now_us, std::vector<Found>* found) const;
-  Owner settle(const Owner& nearest, std::span<const Hit> hits) const;
+  Owner resolve(const Owner& nearest, std::span<const Hit> hits) const;
   std::size_t cell_of(float x, float y) const {
     return static_cast<std::size_t>(static_cast<int>(y) / kCell_px * columns_ +
                                     static_cast<int>(x) / kCell_px);
@@ -65,10 +65,10 @@ class StripIndex {
 
   int columns_, rows_;
   float half_length_, ambiguity_;
-  std::vector<Strip> strips_;         ///< and one more, which nothing is near
-  std::vector<Entry> entries_;        ///< the first is every list's end: it is of that strip and its own next
+  std::vector<AssociationBand> bands_;         ///< and one more, which nothing is near
+  std::vector<Entry> entries_;        ///< the first is every list's end: it is of that band and its own next
   std::vector<std::int32_t> heads_;   ///< of each cell's list of entries
-  std::vector<std::uint32_t> close_;  ///< events in cells with strips
+  std::vector<std::uint32_t> close_;  ///< events in cells with bands
 };
 
 }  // namespace evpose

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/registration/event_alignment.h"
+#include "evpose/registration/event_registration.h"
 
 #include <gtest/gtest.h>
 
@@ -15,11 +15,11 @@ constexpr double kFocal = 300;  // px per metre of the toy camera: a shift of th
 
 /// Straight contours in a 320 x 240 image; the pose's first two parameters shift the image, the others do
 /// nothing.
-class EventAlignmentLaws : public ::testing::Test {
+class EventRegistrationLaws : public ::testing::Test {
  protected:
-  EventAlignmentLaws() {
-    config_.lateness = false;
-    config_.honest_slope = false;
+  EventRegistrationLaws() {
+    config_.edge_delay = false;
+    config_.gate_truncation_correction = false;
     config_.widest_gate_px = 6;
     config_.map_sigma_m = 0;
     covariance_.setZero();
@@ -56,162 +56,161 @@ class EventAlignmentLaws : public ::testing::Test {
     events_.push_back(e);
   }
 
-  EventAlignmentResult align() {
-    EventAlignment alignment({320, 240}, config_);
-    return alignment.align({events_, kNow, kSpan_s, samples_, covariance_});
+  RegistrationResult measure() {
+    EventRegistration registration({320, 240}, config_);
+    return registration.measure({events_, kNow, kSpan_s, samples_, covariance_});
   }
 
-  EventAlignmentConfig config_;
+  EventRegistrationConfig config_;
   std::vector<ContourSample> samples_;
   std::vector<FrontEvent> events_;
   Matrix6d covariance_;
 };
 
-double solved(const EventAlignmentResult& r, int i) { return r.vector(i) / r.information(i, i); }
+double solved(const RegistrationResult& r, int i) { return r.vector(i) / r.information(i, i); }
 
-TEST_F(EventAlignmentLaws, AShiftOfTheContoursIsFoundInEachDirection) {
+TEST_F(EventRegistrationLaws, AShiftOfTheContoursIsFoundInEachDirection) {
   // Lines along the pixel grid put every event exactly where it belongs.
   add_line({100, 40}, {1, 0}, 0);
   add_line({40, 200}, {0, -1}, 0);
   for (auto& s : samples_) s.pixel -= 0.2 * Eigen::Vector2d(1, 1);  // the prediction is off by so much
   draw_events(0);
   for (auto& e : events_) EXPECT_TRUE(e.x > 0);
-  const EventAlignmentResult r = align();
-  EXPECT_EQ(r.matched_samples, 40);
+  const RegistrationResult r = measure();
+  EXPECT_EQ(r.inliers, 40);
   // The contours have to move by +0.2 px along x and along y.
   EXPECT_NEAR(solved(r, 0) * kFocal, 0.2, 0.04);
   EXPECT_NEAR(solved(r, 1) * kFocal, 0.2, 0.04);
 }
 
-TEST_F(EventAlignmentLaws, EventsOfAnyAgeMeetTheContourWhereItWasThen) {
+TEST_F(EventRegistrationLaws, EventsOfAnyAgeMeetTheContourWhereItWasThen) {
   add_line({150, 40}, {1, 0}, 500);  // 2 px in the span
   for (double age : {0.0, 0.002, 0.004}) add_event({150 - 500 * age, 60}, age);
-  const EventAlignmentResult r = align();
-  EXPECT_EQ(r.matched_events, 3);
-  EXPECT_LT(r.mean_square_px2, 1e-9);
+  const RegistrationResult r = measure();
+  EXPECT_EQ(r.events, 3);
+  EXPECT_LT(r.residual, 3e-5);
 }
 
-TEST_F(EventAlignmentLaws, AccelerationOfTheContourCounts) {
+TEST_F(EventRegistrationLaws, AccelerationOfTheContourCounts) {
   add_line({150, 40}, {1, 0}, 500);
   for (auto& s : samples_) s.curvature_px_s2 = 62'500;  // 1 px at 4 ms
   add_event({149, 60}, 0.004);                          // 150 - 2 + 1
-  const EventAlignmentResult r = align();
-  EXPECT_EQ(r.matched_events, 1);
-  EXPECT_LT(r.mean_square_px2, 1e-9);
+  const RegistrationResult r = measure();
+  EXPECT_EQ(r.events, 1);
+  EXPECT_LT(r.residual, 3e-5);
 }
 
-TEST_F(EventAlignmentLaws, LatenessIsTakenOffInTheDirectionOfMotion) {
-  config_.lateness = true;
-  config_.contrast.unknown_lateness_px = config_.contrast.lateness_px = config_.contrast.latest_px = 0.25;
+TEST_F(EventRegistrationLaws, EdgeDelayIsTakenOffInTheDirectionOfMotion) {
+  config_.edge_delay = true;
   for (double speed : {400.0, -400.0}) {
     samples_.clear();
     events_.clear();
-    add_line({150.25 * (speed > 0 ? 1 : 0) + 149.75 * (speed > 0 ? 0 : 1), 40}, {1, 0}, speed);
-    add_event({150, 60}, 0);  // a quarter pixel behind the contour
-    EXPECT_LT(align().mean_square_px2, 1e-9) << speed;
+    add_line({150 + std::copysign(ContrastMemory::kUnknownDelay_px, speed), 40}, {1, 0}, speed);
+    add_event({150, 60}, 0);  // behind the contour by the delay of one that is not known yet
+    EXPECT_LT(measure().residual, 1e-5) << speed;
   }
 }
 
-TEST_F(EventAlignmentLaws, GateOpensWithThePredictionsUncertainty) {
+TEST_F(EventRegistrationLaws, GateOpensWithThePredictionsUncertainty) {
   add_line({150, 40}, {1, 0}, 0);
   add_event({152, 60}, 0);
-  EXPECT_EQ(align().matched_events, 0);
+  EXPECT_EQ(measure().events, 0);
   covariance_(0, 0) = std::pow(1.0 / kFocal, 2);  // 1 px
-  EXPECT_EQ(align().matched_events, 1);
+  EXPECT_EQ(measure().events, 1);
 }
 
-TEST_F(EventAlignmentLaws, GateNeverOpensBeyondItsBound) {
+TEST_F(EventRegistrationLaws, GateNeverOpensBeyondItsBound) {
   add_line({150, 40}, {1, 0}, 0);
   add_event({150 + config_.widest_gate_px + 1, 60}, 0);
   add_event({150 + config_.widest_gate_px - 1, 64}, 0);
   covariance_(0, 0) = std::pow(100 / kFocal, 2);
-  EXPECT_EQ(align().matched_events, 1);
+  EXPECT_EQ(measure().events, 1);
 }
 
-TEST_F(EventAlignmentLaws, EventsSpreadEvenlyDoNotCountAsCaptured) {
-  config_.honest_slope = true;
+TEST_F(EventRegistrationLaws, EventsSpreadEvenlyDoNotCountAsConsistent) {
+  config_.gate_truncation_correction = true;
   add_line({150, 20}, {1, 0.3}, 0, 50);
   std::mt19937 random(4);
   for (int i = 0; i < 100'000; ++i)
     add_event({80.0 + static_cast<double>(random() % 81), 20.0 + static_cast<double>(random() % 200)}, 0);
-  EXPECT_FALSE(align().captured);
+  EXPECT_FALSE(measure().consistent);
 }
 
-TEST_F(EventAlignmentLaws, SlopeOfEventsOnTheContourIsThatOfNoGate) {
-  config_.honest_slope = true;
+TEST_F(EventRegistrationLaws, ConcentrationOfEventsOnTheContourIsThatOfNoGate) {
+  config_.gate_truncation_correction = true;
   add_line({150, 20}, {1, 0}, 0, 50);
   for (int i = 0; i < 2000; ++i) add_event({150, 20.0 + i % 190}, 0);
-  const EventAlignmentResult honest = align();
-  EXPECT_TRUE(honest.captured);
-  config_.honest_slope = false;
-  EXPECT_NEAR(honest.information(0, 0) / align().information(0, 0), 1, 1e-9);
+  const RegistrationResult honest = measure();
+  EXPECT_TRUE(honest.consistent);
+  config_.gate_truncation_correction = false;
+  EXPECT_NEAR(honest.information(0, 0) / measure().information(0, 0), 1, 1e-9);
 }
 
-TEST_F(EventAlignmentLaws, WrongPolaritiesAreLeftOutOnceContrastIsKnown) {
-  EventAlignment alignment({320, 240}, config_);
+TEST_F(EventRegistrationLaws, WrongPolaritiesAreLeftOutOnceContrastIsKnown) {
+  EventRegistration registration({320, 240}, config_);
   add_line({150, 20}, {1, 0}, 500, 50);
   for (auto& s : samples_) s.speed_sigma_px_s = 10;
   for (unsigned seed : {1, 2, 3}) draw_events(0, seed);
   for (auto& e : events_) e.on = 1;  // getting brighter as it comes: dark in front
   for (int k = 0; k < 4; ++k)
-    EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
+    EXPECT_EQ(registration.measure({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
   for (auto& e : events_) e.on = 0;
-  const EventAlignmentResult wrong = alignment.align({events_, kNow, kSpan_s, samples_, covariance_});
+  const RegistrationResult wrong = registration.measure({events_, kNow, kSpan_s, samples_, covariance_});
   EXPECT_GT(wrong.wrong_polarity, 100);
   // In the buffer zone both polarities count.
   for (auto& s : samples_) s.speed_sigma_px_s = 1000;
-  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
+  EXPECT_EQ(registration.measure({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
 }
 
-TEST_F(EventAlignmentLaws, EventsBetweenTwoContoursAreLeftOut) {
+TEST_F(EventRegistrationLaws, EventsBetweenTwoContoursAreLeftOut) {
   config_.gate_px = 2;
   add_line({150, 40}, {1, 0}, 0);
   add_event({151, 60}, 0);
-  EXPECT_EQ(align().matched_events, 1);
+  EXPECT_EQ(measure().events, 1);
   add_line({152, 40}, {1, 0}, 0);
-  EXPECT_EQ(align().matched_events, 0);
+  EXPECT_EQ(measure().events, 0);
 }
 
-TEST_F(EventAlignmentLaws, UniformClutterPullsNowhere) {
+TEST_F(EventRegistrationLaws, UniformClutterPullsNowhere) {
   config_.gate_px = 3;
   add_line({150.3, 20}, {1, 0}, 0, 50);
   std::mt19937 random(4);
   for (int i = 0; i < 200'000; ++i)
     add_event({140.0 + static_cast<double>(random() % 21), 20.0 + static_cast<double>(random() % 200)}, 0);
-  EXPECT_NEAR(solved(align(), 0) * kFocal, 0, 0.05);
+  EXPECT_NEAR(solved(measure(), 0) * kFocal, 0, 0.05);
 }
 
-TEST_F(EventAlignmentLaws, InformationOfOneClusterIsBounded) {
+TEST_F(EventRegistrationLaws, InformationOfOneClusterIsBounded) {
   add_line({150, 33}, {1, 0}, 0, 4);
   std::vector<double> information;
   for (int n : {1, 10, 100, 10'000}) {
     events_.clear();
     for (int i = 0; i < n; ++i) add_event({150, 33.0 + i % 12}, 0);
-    information.push_back(align().information(0, 0));
+    information.push_back(measure().information(0, 0));
   }
   EXPECT_GT(information[1], information[0]);
-  const double repeats = config_.shared_s / kSpan_s;
-  const double bound = kFocal * kFocal / (repeats * config_.shared_sigma_px * config_.shared_sigma_px);
+  const double repeats = config_.correlation_time_s / kSpan_s;
+  const double bound = kFocal * kFocal / (repeats * config_.correlated_sigma_px * config_.correlated_sigma_px);
   EXPECT_LT(information[3], bound);
   EXPECT_GT(information[3], 0.9 * bound * 0.99);
 }
 
-TEST_F(EventAlignmentLaws, NothingInNothingOut) {
-  EXPECT_EQ(align().information, Matrix6d::Zero());
+TEST_F(EventRegistrationLaws, NothingInNothingOut) {
+  EXPECT_EQ(measure().information, Matrix6d::Zero());
   add_line({150, 40}, {1, 0}, 0);
-  EXPECT_EQ(align().information, Matrix6d::Zero());
+  EXPECT_EQ(measure().information, Matrix6d::Zero());
   samples_.clear();
   add_event({150, 60}, 0);
-  EXPECT_EQ(align().matched_events, 0);
+  EXPECT_EQ(measure().events, 0);
 }
 
-TEST_F(EventAlignmentLaws, StripsAreReleasedAfterEachCall) {
-  EventAlignment alignment({320, 240}, config_);
+TEST_F(EventRegistrationLaws, BandsAreReleasedAfterEachCall) {
+  EventRegistration registration({320, 240}, config_);
   add_line({150, 40}, {1, 0}, 0);
   add_event({150, 60}, 0);
-  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, samples_, covariance_}).matched_events, 1);
+  EXPECT_EQ(registration.measure({events_, kNow, kSpan_s, samples_, covariance_}).events, 1);
   const std::vector<ContourSample> none;
-  EXPECT_EQ(alignment.align({events_, kNow, kSpan_s, none, covariance_}).matched_events, 0);
+  EXPECT_EQ(registration.measure({events_, kNow, kSpan_s, none, covariance_}).events, 0);
 }
 
 }  // namespace

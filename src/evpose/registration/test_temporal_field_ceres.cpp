@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include "evpose/registration/registration.h"
+#include "evpose/registration/test_temporal_field_ceres.h"
 
 namespace evpose {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 /// further small perturbation e: T(d).plus(e) = T(d + (e_p, Jr^-1 e_phi)).
 class PointCost final : public ceres::SizedCostFunction<1, 6> {
  public:
-  PointCost(const AlignmentProblem& problem, FieldKernel kernel, const AlignmentPoint& point, double scale)
+  PointCost(const FieldProblem& problem, FieldKernel kernel, const FieldPoint& point, double scale)
       : problem_(problem), kernel_(kernel), point_(point), root_scale_(std::sqrt(scale)) {}
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
@@ -34,9 +34,9 @@ class PointCost final : public ceres::SizedCostFunction<1, 6> {
   }
 
  private:
-  const AlignmentProblem& problem_;
+  const FieldProblem& problem_;
   FieldKernel kernel_;
-  const AlignmentPoint& point_;
+  const FieldPoint& point_;
   double root_scale_;
 };
 
@@ -59,7 +59,7 @@ class PriorCost final : public ceres::SizedCostFunction<6, 6> {
 
 }  // namespace
 
-AlignmentResult align_ceres(const AlignmentProblem& problem, const RegistrationConfig& config) {
+FieldSolution minimise_with_ceres(const FieldProblem& problem, const TemporalFieldConfig& config) {
   const double scale = 1 / (config.noise * config.noise * config.correlated_points);
   Vector6d d = Vector6d::Zero();
   ceres::Problem::Options own;
@@ -77,7 +77,7 @@ AlignmentResult align_ceres(const AlignmentProblem& problem, const RegistrationC
   ceres::Solver::Summary summary;
   ceres::Solve(options, &reference, &summary);
 
-  AlignmentResult result;
+  FieldSolution result;
   result.T_map_body = problem.T_map_body_predicted.plus(d);
   result.iterations = static_cast<int>(summary.iterations.size());
   result.converged = summary.termination_type == ceres::CONVERGENCE;

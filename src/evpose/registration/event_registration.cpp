@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/registration/event_registration.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kContourPrior = 0.5;  // an event in the gate is of the contour rather than clutter
+// Samples stand at least 4 px apart along a contour: each answers for half of that to either side, and more
+// where samples are left out.
+constexpr double kHalfLength_px = 4;
+constexpr double kAmbiguity_px = 1;      // events as near to two contours as this are left out
+constexpr double kSureContrast = 0.3;    // thresholds of contrast from which on a polarity is predicted
+constexpr double kFullDelay_px_s = 20;   // below this flow the edge delay fades out: noise, not the edge, triggers
+constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a contour and still be found
+constexpr int kClustersPerWidth = 20;    // cells whose events share an error: 32 px at VGA
+
+// Gate concentration.
+constexpr double kGateRim = 0.8;         // events beyond this share of the gate tell the density at it
+constexpr double kMemory_s = 0.05;       // of the sums, while many events come
+constexpr double kLongestMemory_s = 1;   // of the sums, while few events come
+constexpr double kEnoughWeight = 50;     // of events, from which on the concentration is believed
+constexpr double kLeastConcentration = 0.15;  // keeps the correction finite
+constexpr double kConsistent = 0.3;      // concentration of events that are of the contours
+
+constexpr std::uint32_t kProbeEvery = 4;  // calls after which a sample's owned area is probed again
+
+}  // namespace
+
+void describe(ConfigTable& table, EventRegistrationConfig& c) {
+  table.add("gate_px", c.gate_px, "px",
+            "events within this, joined with two sigma of the map, belong to a contour", {0.1, 50});
+  table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
+  table.add("correlated_sigma_px", c.correlated_sigma_px, "px", "error that neighbouring events share", {0, 10});
+  table.add("correlation_time_s", c.correlation_time_s, "s", "how long such an error lasts", {0, 100});
+  table.add("map_sigma_m", c.map_sigma_m, "m", "error across the contour of map points that state none",
+            {0, 1});
+  table.add("edge_delay", c.edge_delay, "take off that events come after the contour");
+  table.add("polarity", c.polarity, "leave out events whose polarity contrast and flow exclude");
+  table.add("buffer_sigma", c.buffer_sigma, "",
+            "both polarities count where the normal flow is less sigma from zero (adaptive buffer zone)", {0, 100});
+  table.add("ego_motion_test", c.ego_motion_test, "mistrust cells whose events do not move as the ego-motion says");
+  table.add("contrast_threshold", c.contrast_threshold, "", "of the camera: log luminance step that makes an event",
+            {0.01, 2});
+}
+
+EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConfig& config, std::uint32_t segments)
+    : size_(size),
+      config_(config),
+      index_(size, kHalfLength_px, kAmbiguity_px),
+      contrast_(segments, config.contrast_threshold) {}
+
+double EventRegistration::Concentration::value() const {
+  return weight > 0 ? std::clamp((inside - at_gate) / weight, kLeastConcentration, 1.0) : 1;
+}
+
+void EventRegistration::Concentration::decay(double span_s) {
+  const double keep = std::clamp(2 * kEnoughWeight / std::max(weight, 1e-9), std::exp(-span_s / kMemory_s),
+                                 std::exp(-span_s / kLongestMemory_s));
+  weight *= keep, inside *= keep, at_gate *= keep;
+}
+
+/// Events spread evenly over the gates do not tell of contours: the pose is not where it is thought to be.
+bool EventRegistration::consistent() const {
+  return concentration_.weight < kEnoughWeight || concentration_.value() >= kConsistent;
+}
+
+bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) const {
+  const double steps = contrast_.steps(s.segment);
+  return sign * steps < 0 && std::abs(steps) >= kSureContrast && contrast_.known(s.segment) &&
+         std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
+}
+
+/// Gate, edge delay, weight and excluded polarities of one sample.
+EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance, double gate) const {
+  const double variance =
+      config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
+  const double odds = kContourPrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kContourPrior);
+  const int forward = s.speed_px_s > 0 ? 1 : -1;
+  const double fade = std::min(1.0, std::abs(s.speed_px_s) / kFullDelay_px_s);
+  const ContrastMemory::EdgeDelay delay = contrast_.edge_delay(s.segment);
+  const double along_motion = config_.edge_delay ? std::copysign(fade, s.speed_px_s) : 0;
+  return {static_cast<float>(along_motion * delay.on_px),
+          static_cast<float>(along_motion * delay.off_px),
+          static_cast<float>(gate),
+          static_cast<float>(-0.5 / variance),
+          static_cast<float>(odds),
+          static_cast<std::int8_t>(polarity_is_wrong(s, forward)),
+          static_cast<std::int8_t>(polarity_is_wrong(s, -forward)),
+          static_cast<std::int8_t>(forward)};
+}
+
+/// What pixels the samples answer for, and by what rules.
+void EventRegistration::build_bands(const RegistrationProblem& p) {
+  const std::size_t n = p.samples.size();
+  bands_.resize(n);
+  lines_.resize(n);
+  const double widest = std::max(config_.gate_px, config_.widest_gate_px);
+  for (std::size_t i = 0; i < n; ++i) {
+    const ContourSample& s = p.samples[i];
+    const double pose_variance = std::max(0.0, s.jacobian.dot(p.pose_covariance * s.jacobian));
+    const double own = std::min(config_.gate_px + 2 * std::sqrt(pose_variance), widest);
+    const double gate = std::sqrt(own * own + 4 * s.map_sigma_px * s.map_sigma_px);
+    const Eigen::Vector2f pixel = s.pixel.cast<float>(), normal = s.normal_px.cast<float>();
+    bands_[i] = {pixel.x(),
+                 pixel.y(),
+                 normal.x(),
+                 normal.y(),
+                 static_cast<float>(1e-6 * s.speed_px_s),
+                 static_cast<float>(1e-12 * s.curvature_px_s2),
+                 static_cast<float>(std::max(gate, config_.contrast_band_px) + kLargestDelay_px)};
+    lines_[i] = line_of(s, pose_variance, gate);
+  }
+  index_.build(bands_, static_cast<float>(1e6 * p.span_s));
+}
+
+/// An event in the gate that is used.
+void EventRegistration::add_event(std::int32_t band, float d, Sum* sum) {
+  const Line& line = lines_[static_cast<std::size_t>(band)];
+  const float odds = line.odds * std::exp(line.exponent * d * d), w = odds / (1 + odds);
+  sum->weight += w;
+  sum->offset += w * d;
+  sum->square += w * d * d;
+  ++sum->events;
+  concentration_.weight += w;
+  concentration_.inside += w + 2 * w * (1 - w) * d * d * line.exponent;
+  if (std::abs(d) > kGateRim * line.gate)
+    concentration_.at_gate += w * std::abs(d) / ((1 - kGateRim) * line.gate);
+}
+
+void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationResult* result) {
+  sums_.assign(p.samples.size(), {});
+  concentration_.decay(p.span_s);
+  const auto contrast_band_px = static_cast<float>(config_.contrast_band_px);
+  if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);
+  if (p.verdicts) owners_.assign(p.events.size(), -1);
+  index_.find_all(p.events, p.now_us, &found_);
+  for (const auto& [k, owner] : found_) {
+    const FrontEvent& e = p.events[k];
+    const auto set_verdict = [&, k = k, band = owner.band](EventVerdict v) {
+      if (p.verdicts) (*p.verdicts)[k] = v, owners_[k] = band;
+    };
+    const Line& line = lines_[static_cast<std::size_t>(owner.band)];
+    Sum& sum = sums_[static_cast<std::size_t>(owner.band)];
+    const float d = owner.distance + (e.on ? line.delay_on : line.delay_off);
+    if (std::abs(d) <= contrast_band_px) sum.net += e.on ? line.forward : -line.forward;
+    set_verdict(EventVerdict::beside);
+    if (std::abs(d) > line.gate) continue;
+    if (config_.polarity && (e.on ? line.wrong_on : line.wrong_off)) {
+      set_verdict(EventVerdict::wrong_polarity);
+      ++result->wrong_polarity;
+      continue;
+    }
+    if (config_.ego_motion_test) {
+      const AssociationBand& band = bands_[static_cast<std::size_t>(owner.band)];
+      const FlowMonitor::Answer answer = flow_.compare(*p.surface, e, band.nx, band.ny, 1e6F * band.speed);
+      sum.agree += answer == FlowMonitor::Answer::agrees;
+      sum.differ += answer == FlowMonitor::Answer::differs;
+    }
+    set_verdict(line.wrong_on || line.wrong_off ? EventVerdict::predicted : EventVerdict::contour);
+    add_event(owner.band, d, &sum);
+  }
+}
+
+/// Whether the sample's band owns one probe position in it, a different one at every call.
+bool EventRegistration::owns_probe(std::size_t sample, float half_span_us) const {
+  const auto in_unit_interval = [](float step, std::uint64_t k) {  // -1..1, evenly: the R2 sequence
+    const float v = step * static_cast<float>(k % 4096);
+    return 2 * (v - std::floor(v)) - 1;
+  };
+  const std::uint64_t k = 17 * sample + call_ / kProbeEvery;
+  const AssociationBand& s = bands_[sample];
+  const float along = in_unit_interval(0.7548777F, k) * static_cast<float>(kHalfLength_px);
+  const float across = in_unit_interval(0.5698403F, k) * static_cast<float>(config_.contrast_band_px) -
+                       (s.speed - s.curvature * half_span_us) * half_span_us;
+  const float x = s.x + across * s.nx - along * s.ny, y = s.y + across * s.ny + along * s.nx;
+  if (!(x >= 0 && y >= 0 && x <= static_cast<float>(size_.width - 1) &&
+        y <= static_cast<float>(size_.height - 1)))
+    return false;
+  return index_.find(x, y, half_span_us).band == static_cast<std::int32_t>(sample);
+}
+
+/// Tells the contrast memory what area each segment has swept, owned length times way, and what events fell
+/// there.
+void EventRegistration::learn_contrast(const RegistrationProblem& p) {
+  ++call_;
+  const auto half_span_us = static_cast<float>(0.5e6 * p.span_s);
+  const double swept_s = kProbeEvery * p.span_s;
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const ContourSample& s = p.samples[i];
+    // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
+    if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
+      contrast_.sweep(s.segment, 2 * kHalfLength_px * std::abs(s.speed_px_s) * swept_s);
+    if (sums_[i].net != 0) contrast_.count(s.segment, sums_[i].net);
+  }
+}
+
+/// Cell and 45 deg bin of the contour's direction.
+std::uint32_t EventRegistration::cluster_of(const ContourSample& s) const {
+  const int cell = std::max(1, size_.width / kClustersPerWidth);
+  const int columns = size_.width / cell + 1, rows = size_.height / cell + 1;
+  const int cx = std::clamp(static_cast<int>(s.pixel.x()) / cell, 0, columns - 1);
+  const int cy = std::clamp(static_cast<int>(s.pixel.y()) / cell, 0, rows - 1);
+  const Eigen::Vector2d n = s.normal_px.y() < 0 ? Eigen::Vector2d(-s.normal_px) : s.normal_px;
+  const int bin = n.x() >= 0 ? (n.y() < n.x() ? 0 : 1) : (n.y() > -n.x() ? 2 : 3);
+  return static_cast<std::uint32_t>((cy * columns + cx) * 4 + bin);
+}
+
+void EventRegistration::number_clusters(const RegistrationProblem& p) {
+  cluster_numbers_.resize(p.samples.size());
+  for (std::size_t i = 0; i < p.samples.size(); ++i)
+    if (sums_[i].events > 0) cluster_numbers_[i] = cluster_of(p.samples[i]);
+}
+
+/// Finds the clusters that hold events which do not move as the ego-motion says (EV-Pose 5.3).
+void EventRegistration::test_ego_motion(const RegistrationProblem& p) {
+  flow_.advance(p.span_s);
+  for (std::size_t i = 0; i < p.samples.size(); ++i)
+    if (sums_[i].events > 0) flow_.add(cluster_numbers_[i], sums_[i].agree, sums_[i].differ);
+}
+
+void EventRegistration::sum_clusters(const RegistrationProblem& p) {
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    if (sums_[i].events == 0) continue;
+    const std::uint32_t number = cluster_numbers_[i];
+    if (number >= clusters_.size()) clusters_.resize(number + 1);
+    Cluster& c = clusters_[number];
+    if (c.weight == 0 && config_.ego_motion_test) c.trust = flow_.trust(number);
+    c.weight += sums_[i].weight;
+    c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
+  }
+}
+
+/// Normal equations of the samples. Events of one cluster share errors: its information is capped.
+void EventRegistration::sum_information(const RegistrationProblem& p, RegistrationResult* result) {
+  const double event_variance = config_.event_sigma_px * config_.event_sigma_px;
+  const double repeats = std::max(1.0, config_.correlation_time_s / std::max(p.span_s, 1e-6));
+  const double correction = config_.gate_truncation_correction ? concentration_.value() : 1;
+  double weight = 0, square = 0;
+  offsets_.clear();
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const Sum& sum = sums_[i];
+    if (sum.events == 0) continue;
+    ++result->inliers;
+    result->events += sum.events;
+    weight += sum.weight;
+    square += sum.square;
+    const Cluster& c = clusters_[cluster_numbers_[i]];
+    const double own = event_variance / c.weight;
+    const double shared =
+        repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px + c.map_variance / c.weight);
+    const double scale = c.trust * own / (own + shared) / event_variance;
+    if (c.trust < 0.5) result->other_motion += sum.events;
+    const Vector6d& J = p.samples[i].jacobian;
+    result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * correction * sum.weight);
+    result->vector -= scale * sum.offset * J;
+    if (sum.weight > 0)
+      offsets_.push_back({i, -sum.offset / (correction * sum.weight), scale * correction * sum.weight});
+  }
+  result->information.triangularView<Eigen::StrictlyUpper>() = result->information.transpose();
+  result->residual = weight > 0 ? std::sqrt(square / weight) : 0;
+}
+
+void EventRegistration::mark_other_motion(const RegistrationProblem& p) {
+  for (std::size_t k = 0; k < p.events.size(); ++k) {
+    EventVerdict& verdict = (*p.verdicts)[k];
+    if (verdict != EventVerdict::contour && verdict != EventVerdict::predicted) continue;
+    const auto sample = static_cast<std::size_t>(owners_[k]);
+    if (clusters_[cluster_numbers_[sample]].trust < 0.5) verdict = EventVerdict::other_motion;
+  }
+}
+
+RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
+  EVPOSE_CHECK(!config_.ego_motion_test || p.surface != nullptr);
+  RegistrationResult result;
+  build_bands(p);
+  sum_events(p, &result);
+  learn_contrast(p);
+  number_clusters(p);
+  if (config_.ego_motion_test) test_ego_motion(p);
+  sum_clusters(p);
+  sum_information(p, &result);
+  if (p.verdicts) mark_other_motion(p);
+  for (std::size_t i = 0; i < p.samples.size(); ++i)
+    if (sums_[i].events > 0) clusters_[cluster_numbers_[i]] = {};
+  result.points = static_cast<int>(p.samples.size());
+  result.gate_concentration = concentration_.weight < kEnoughWeight ? 0 : concentration_.value();
+  result.consistent = consistent();
+  return result;
+}
+
+}  // namespace evpose

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "evpose/camera/camera.h"
+#include "evpose/core/pose.h"
+#include "evpose/event/event_front.h"
+#include "evpose/registration/association_band.h"
+#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/flow_monitor.h"
+#include "evpose/registration/registration.h"
+
+namespace evpose {
+
+class ConfigTable;
+
+struct EventRegistrationConfig {
+  double gate_px = 0.5;              ///< an event belongs to a contour within this and two sigma of the map
+  double event_sigma_px = 0.7;       ///< scatter of a contour's events about it
+  double correlated_sigma_px = 0.35;  ///< error that the events of a cell and direction share
+  double correlation_time_s = 0.025;  ///< how long such an error lasts
+  double map_sigma_m = 0.5e-3;        ///< of map points that state no sigma
+  bool edge_delay = true;             ///< events come after the contour, by contrast and polarity
+  bool polarity = true;               ///< leave out events of the polarity that contrast and flow exclude
+  double buffer_sigma = 3;            ///< both polarities count where the flow is nearer to zero (EV-Pose 5.1)
+  bool ego_motion_test = false;       ///< mistrust cells whose events move otherwise (EV-Pose 5.3)
+  double contrast_threshold = 0.25;   ///< of the camera, in log luminance
+
+  // Not for users: the relocalizer's wide stages differ in these.
+  double widest_gate_px = 0.55;            ///< two sigma of the prediction open the gate, but no further
+  double contrast_band_px = 1.5;           ///< events so near teach the contrast
+  bool gate_truncation_correction = true;  ///< take off the information that the gate hides
+};
+void describe(ConfigTable& table, EventRegistrationConfig& config);
+
+/// Registration of each event once, at its own time, against the moving contours: the distance field of
+/// EV-Pose 4.2 turned round. An event at x of age a has the signed distance
+///   d = n.(x - u) + s1 a - s2 a^2 + delay sign(s1)
+/// from the contour sample that claims its pixel; d is zero-mean Gaussian for events of the contour and
+/// uniform over the gate for clutter (soft assignment). The gate is tight: a wide one was measured to hand
+/// the pose to texture beside the contours. It follows the map's sigma. A gate truncates: events that an
+/// offset moves out of it no longer tell of the offset. How much is lost follows from the density of events at
+/// the gate and is taken off the information (gate truncation correction). Events of a cell and direction
+/// share errors that last; their information is capped accordingly.
+class EventRegistration final : public Registration {
+ public:
+  /// `segments`: number of the map's contrast segments.
+  EventRegistration(ImageSize size, const EventRegistrationConfig& config, std::uint32_t segments = 1);
+
+  RegistrationResult measure(const RegistrationProblem& problem) override;
+  void restart() override { concentration_ = {}; }
+  bool reads_surface() const override { return config_.ego_motion_test; }
+  std::span<const SampleOffset> offsets() const override { return offsets_; }
+  const ContrastMemory* contrast() const override { return &contrast_; }
+
+ private:
+  /// What an event needs to know of the sample that it belongs to.
+  struct Line {
+    float delay_on, delay_off;        ///< px, along the normal
+    float gate;                       ///< px
+    float exponent, odds;             ///< exp(exponent d^2) * odds: of the contour against clutter
+    std::int8_t wrong_on, wrong_off;  ///< polarity excluded
+    std::int8_t forward;              ///< +1 if the contour moves along its normal, else -1
+  };
+  struct Sum {
+    double weight = 0, offset = 0, square = 0;
+    int events = 0, net = 0;    ///< net: events near by, for the contrast
+    int agree = 0, differ = 0;  ///< events in the gate that move as predicted, or not
+  };
+  /// Derivative of the mean distance by an offset, from sums over events with exponential forgetting: 1 for
+  /// events that all lie near the contours, 0 for events spread evenly over the gates.
+  struct Concentration {
+    double weight = 0, inside = 0, at_gate = 0;
+    double value() const;
+    void decay(double span_s);
+  };
+  struct Cluster {
+    double weight = 0, map_variance = 0, trust = 1;
+  };
+  void build_bands(const RegistrationProblem& problem);
+  Line line_of(const ContourSample& sample, double pose_variance, double gate) const;
+  void sum_events(const RegistrationProblem& problem, RegistrationResult* result);
+  void add_event(std::int32_t band, float distance, Sum* sum);
+  void learn_contrast(const RegistrationProblem& problem);
+  void number_clusters(const RegistrationProblem& problem);
+  void test_ego_motion(const RegistrationProblem& problem);
+  void sum_clusters(const RegistrationProblem& problem);
+  void sum_information(const RegistrationProblem& problem, RegistrationResult* result);
+  void mark_other_motion(const RegistrationProblem& problem);
+  std::uint32_t cluster_of(const ContourSample& sample) const;
+  bool consistent() const;
+  bool polarity_is_wrong(const ContourSample& sample, int sign) const;
+  bool owns_probe(std::size_t sample, float half_span_us) const;
+
+  ImageSize size_;
+  EventRegistrationConfig config_;
+  AssociationIndex index_;
+  ContrastMemory contrast_;
+  FlowMonitor flow_;
+  Concentration concentration_;
+  // Of the last call, one for each sample; kept so that steady state allocates nothing.
+  std::vector<AssociationBand> bands_;
+  std::vector<Line> lines_;
+  std::vector<AssociationIndex::Found> found_;
+  std::vector<Sum> sums_;
+  std::vector<SampleOffset> offsets_;
+  std::vector<Cluster> clusters_;
+  std::vector<std::uint32_t> cluster_numbers_;
+  std::vector<std::int32_t> owners_;  ///< of the events, if verdicts are asked for
+  std::uint32_t call_ = 0;
+};
+
+}  // namespace evpose

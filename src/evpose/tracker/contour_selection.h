@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "evpose/fusion/state.h"
+#include "evpose/map/visible_set.h"
+#include "evpose/registration/contour_view.h"
+
+namespace evpose {
+
+/// The view-limited, occlusion-aware part of the map (EV-Pose 5.3), as samples for the registration.
+class ContourSelection {
+ public:
+  /// `map_sigma_m`: of contour points that state none. References are kept, but for the configuration.
+  ContourSelection(const ContourIndex& index, const ContourSegments& segments, const Camera& camera,
+                   const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m, bool own_thread);
+
+  /// The first choice of points is the dearest: made before the data come.
+  void prepare(const Pose& T_map_body) { visible_.choose(T_map_body * view_.T_body_cam); }
+  /// Chooses the points that the camera should see at this state, and projects them over the last `span_s`.
+  void choose(const FusionState& state, double span_s);
+
+  std::span<const ContourSample> samples() const { return samples_; }
+  std::span<const std::uint32_t> points() const { return visible_.chosen(); }
+  const ContourView& view() const { return view_; }
+  double typical_flow_px_s() const { return typical_flow_px_s_; }
+  double typical_depth_m() const { return typical_depth_m_; }
+
+ private:
+  ContourView view_;
+  VisibleSet visible_;
+  std::vector<ContourSample> samples_;
+  std::vector<double> flows_px_s_, depths_m_;  ///< of the samples
+  double typical_flow_px_s_ = 0, typical_depth_m_ = 3;
+};
+
+}  // namespace evpose

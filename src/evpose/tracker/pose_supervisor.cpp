@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/tracker/pose_supervisor.h"
+
+#include <cmath>
+
+#include "evpose/tracker/pose_uncertainty.h"
+
+namespace evpose {
+
+void PoseSupervisor::start(const FusionState& first, double sigma_px) {
+  health_.start(first.t);
+  before_search_ = first;
+  if (config_.on && sigma_px > Relocalizer::kSearchAboveSigma_px)
+    relocalizer_.begin_search(first.t, first.nav, first.pose_covariance());
+}
+
+std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input, const BackEnd& fusion) {
+  if (!searching()) {
+    if (verifying()) relocalizer_.add_motion(input.motion);
+    return {};
+  }
+  const FusionState& old = fusion.state();
+  const auto found = relocalizer_.process(input);
+  if (!found) return {};
+  FusionState state = fusion.propagator().initial_state(old.t, found->nav, found->angular_rate);
+  state.gyro_bias = old.gyro_bias;
+  state.accel_bias = old.accel_bias;
+  if (fusion.propagator().model() == MotionModel::constant_velocity) state.gyro_bias = -found->angular_rate;
+  const auto set_sigma = [&state](int at, double sigma) {
+    state.covariance.diagonal().segment<3>(at).setConstant(sigma * sigma);
+  };
+  set_sigma(error_state::kP, Relocalizer::kFoundPositionSigma_m);
+  set_sigma(error_state::kPhi, Relocalizer::kFoundRotationSigma_rad);
+  set_sigma(error_state::kV, Relocalizer::kFoundVelocitySigma_m_s);
+  verify_until_ = input.t + from_seconds(Relocalizer::kVerify_s);
+  return state;
+}
+
+/// A pose that was found is believed once its events have concentrated at the contours for a while.
+bool PoseSupervisor::found_pose_is_refuted(TimeNs t, const RegistrationResult& r) const {
+  return verification_is_over(t) && r.gate_concentration < Relocalizer::kLowConcentration;
+}
+
+bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) const {
+  return searching() || t < verify_until_ || found_pose_is_refuted(t, r);
+}
+
+bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const {
+  return !r.consistent || (health == Health::lost && !verifying());
+}
+
+bool PoseSupervisor::search_is_due() const {
+  return config_.on && !searching() && astray_s_ > config_.patience_s;
+}
+
+std::string PoseSupervisor::refusal(TimeNs t, const RegistrationResult& r, double innovation) const {
+  if (searching() || found_pose_is_refuted(t, r)) return "searching for the pose";
+  if (r.points == 0) return "no map point in view";
+  if (r.inliers < health_config_.least_points)
+    return text("only ", r.inliers, " of ", r.points, " map points have events near by");
+  if (!(innovation <= health_config_.gate)) return "registration contradicts the prediction";
+  return "";
+}
+
+void PoseSupervisor::resume_search(TimeNs t, BackEnd& fusion) {
+  // What a wrong pose has taught goes with it.
+  FusionState state = fusion.state();
+  state.gyro_bias = before_search_.gyro_bias;
+  state.accel_bias = before_search_.accel_bias;
+  fusion.start(state);
+  relocalizer_.restart_search(t);
+}
+
+void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance) {
+  Matrix6d around = covariance;
+  around.diagonal().head<3>().array() += std::pow(config_.position_sigma_m, 2);
+  around.diagonal().tail<3>().array() += std::pow(config_.rotation_sigma_rad, 2);
+  before_search_ = fusion.state();
+  relocalizer_.begin_search(t, fusion.state().nav, around);
+  astray_s_ = 0;
+}
+
+Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::string* reason) {
+  const Matrix6d covariance = fusion.state().pose_covariance();
+  const PoseUncertainty uncertainty(fusion.state(), e.focal_px, e.typical_depth_m);
+  const bool refuted = found_pose_is_refuted(e.t, e.registration);
+  Evidence evidence;
+  evidence.t = e.t;
+  evidence.accepted = e.refused.empty();
+  evidence.refused = e.refused;
+  evidence.searching = pose_is_unconfirmed(e.t, e.registration);
+  evidence.sigma_px = uncertainty.sigma_px();
+  if (evidence.sigma_px > health_config_.degraded_sigma_px) evidence.weakest = uncertainty.weakest_direction();
+  evidence.fault = e.fault;
+  const Health health = health_.judge(evidence, reason);
+  astray_s_ = is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
+  if (verification_is_over(e.t)) verify_until_ = 0;
+  if (refuted) resume_search(e.t, fusion);
+  if (search_is_due()) begin_search(e.t, fusion, covariance);
+  return health;
+}
+
+}  // namespace evpose

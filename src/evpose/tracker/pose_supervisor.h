@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "evpose/fusion/back_end.h"
+#include "evpose/registration/registration.h"
+#include "evpose/tracker/health.h"
+#include "evpose/tracker/relocalizer.h"
+
+namespace evpose {
+
+/// What one update has seen, for judgement.
+struct UpdateEvidence {
+  TimeNs t = 0;
+  double span_s = 0;  ///< since the last update
+  const RegistrationResult& registration;
+  std::string refused;  ///< why the registration was not used; empty if it was
+  std::string fault;    ///< what is wrong with the data, if anything
+  double typical_depth_m = 0;
+  double focal_px = 0;
+};
+
+/// Owns the decision whether the pose is known: searches it when it is not, verifies one that was found, notices
+/// when it has gone astray, and names the tracker's health.
+class PoseSupervisor {
+ public:
+  PoseSupervisor(const RelocalizationConfig& relocalization, const HealthConfig& health, Relocalizer relocalizer)
+      : config_(relocalization), health_config_(health), relocalizer_(std::move(relocalizer)), health_(health) {}
+
+  /// Begins with the fusion's first state; searches for the pose if that is too unsure.
+  void start(const FusionState& first, double sigma_px);
+
+  /// The pose is being searched: there is none to measure at.
+  bool searching() const { return relocalizer_.searching(); }
+  /// One update's part of the search, or of watching a pose that was found. The state from which tracking
+  /// begins anew, once it is found.
+  std::optional<FusionState> search(const RelocalizerInput& input, const BackEnd& fusion);
+
+  /// Why the registration is not used; empty if it is.
+  std::string refusal(TimeNs t, const RegistrationResult& registration, double innovation) const;
+
+  /// Judges an update and acts on it: a search may begin or go on.
+  Health judge(const UpdateEvidence& evidence, BackEnd& fusion, std::string* reason);
+  /// At first the estimate is that of the start, not yet that of the contours.
+  bool initialised() const {
+    return health_.state() != Health::waiting && health_.state() != Health::initialising;
+  }
+
+ private:
+  bool verifying() const { return verify_until_ != 0; }
+  bool verification_is_over(TimeNs t) const { return verifying() && t >= verify_until_; }
+  bool found_pose_is_refuted(TimeNs t, const RegistrationResult& registration) const;
+  bool pose_is_unconfirmed(TimeNs t, const RegistrationResult& registration) const;
+  bool is_astray(const RegistrationResult& registration, Health health) const;
+  bool search_is_due() const;
+  void resume_search(TimeNs t, BackEnd& fusion);
+  void begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance);
+
+  RelocalizationConfig config_;
+  HealthConfig health_config_;
+  Relocalizer relocalizer_;
+  HealthMonitor health_;
+  FusionState before_search_;
+  TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
+  double astray_s_ = 0;      ///< for how long the pose has been lost or not consistent with the map
+};
+
+}  // namespace evpose

@@ -10,7 +10,7 @@ import sys
 import harness
 import tables
 
-PAPER = ["--set", "field=exponential"]
+PAPER = ["--set", "registration.kind=temporal_field"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,14 +22,14 @@ class Variant:
 
 
 def everywhere(decay_s):
-    return (*PAPER, "--set", f"exponential.decay_min_s={decay_s}", "--set", f"exponential.decay_max_s={decay_s}")
+    return (*PAPER, "--set", f"temporal_field.decay_min_s={decay_s}", "--set", f"temporal_field.decay_max_s={decay_s}")
 
 
 VARIANTS = [
     Variant("each event once"),
     Variant("each event once, no occluders", occluders=False),
     Variant("the paper's field", tuple(PAPER)),
-    Variant("the paper's field, bilinear", (*PAPER, "--set", "exponential.kernel=bilinear")),
+    Variant("the paper's field, bilinear", (*PAPER, "--set", "temporal_field.kernel=bilinear")),
     Variant("the paper's field, 5 ms everywhere", everywhere(0.005)),
     Variant("the paper's field, 30 ms everywhere", everywhere(0.03)),
     Variant("each event once, no IMU", imu=False),

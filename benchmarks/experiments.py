@@ -119,7 +119,7 @@ def event_table(texts):
 
 
 def make_events(bench):
-    kinds = {"defaults": [], "flow": ["--set", "alignment.flow.on=true"]}
+    kinds = {"defaults": [], "flow": ["--set", "registration.ego_motion_test=true"]}
     figures = {}
     for key, settings in kinds.items():
         texts = {}

@@ -56,7 +56,7 @@ class RecordingsTest(unittest.TestCase):
     def test_the_papers_field_tracks_too(self):
         for recording in MAPS:
             with self.subTest(recording=recording):
-                summary = track(self.out / recording, recording, "--set", "field=exponential", *occluders(recording))
+                summary = track(self.out / recording, recording, "--set", "registration.kind=temporal_field", *occluders(recording))
                 # Just above the pad hardly one of its fewer points has events: that may be called degraded.
                 self.check(summary, 10, 0.5, ("tracking", "degraded"))
 
@@ -74,7 +74,7 @@ class RecordingsTest(unittest.TestCase):
         self.check(json.loads((self.out / "run/summary.json").read_text()), 10, 0.5)
 
     def test_packets_and_threads_change_no_bit(self):
-        for field in ("events", "exponential"):
+        for field in ("events", "temporal_field"):
             files = {}
             for packet_ms, threads in ((0.1, 1), (1, 1), (10, 1), (1, 2), (10, 2)):
                 out = self.out / f"{field}_{packet_ms}_{threads}"

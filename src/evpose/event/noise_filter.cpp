@@ -15,7 +15,7 @@ constexpr double kHotLeastPerSecond = 20;  // unsupported events of a hot pixel:
 }  // namespace
 
 void describe(ConfigTable& table, NoiseFilterConfig& c) {
-  table.add("on", c.on, "drop events without a recent event among their 8 neighbours");
+  table.add("on", c.on, "drop events without a recent event among their 8 neighbours (EV-Pose 4.1)");
   table.add("support_px", c.support_px, "px", "a neighbour's event supports for this much predicted motion",
             {0.01, 100});
   table.add("support_min_s", c.support_min_s, "s", "shortest support window", {1e-5, 10});

@@ -80,7 +80,6 @@ void describe(ConfigTable& table, TemporalFieldConfig& c) {
             "time constant of the field, as predicted motion across the contour", {0.05, 100});
   table.add("decay_min_s", c.decay_min_s, "s", "shortest time constant", {1e-4, 10});
   table.add("decay_max_s", c.decay_max_s, "s", "longest time constant", {1e-4, 10});
-  table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
 }
 
 bool evaluate_point(const FieldProblem& problem, FieldKernel kernel, const Pose& T_map_body,

@@ -16,12 +16,14 @@ namespace evpose {
 
 class ConfigTable;
 
+/// Least distance of two points along one contour: closer ones read the same pixels.
+inline constexpr double kFieldStride_px = 12;
+
 struct TemporalFieldConfig {
   FieldKernel kernel = FieldKernel::spline;
   double decay_px = 0.5;  ///< time constant of the field as predicted motion of the point across its contour
   double decay_min_s = 3e-3;   ///< shortest time constant
   double decay_max_s = 30e-3;  ///< longest time constant; equal to the shortest: the paper's constant
-  double stride_px = 12;       ///< least distance of two points along one contour
 
   // Not for users: tests of the minimum set these.
   double robust_scale = 1.1;  ///< residual (0..1) beyond which Tukey's loss is flat

@@ -4,17 +4,20 @@
 #include "evpose/core/config.h"
 
 namespace evpose {
+namespace {
+
+constexpr double kInitialise_s = 0.05;  // accepted registrations for so long make "tracking" of "initialising"
+
+}  // namespace
 
 void describe(ConfigTable& table, HealthConfig& c) {
-  table.add("initialise_s", c.initialise_s, "s", "accepted registrations for so long end the initialisation",
-            {0, 100});
   table.add("degraded_after_s", c.degraded_after_s, "s", "without an accepted registration: degraded",
             {0, 100});
   table.add("degraded_sigma_px", c.degraded_sigma_px, "px",
             "pose uncertainty as image motion: degraded above", {0, 1e4});
   table.add("lost_sigma_px", c.lost_sigma_px, "px", "pose uncertainty as image motion: lost above", {0, 1e4});
-  table.add("least_points", c.least_points, "", "least number of points with events near by", {1, 100000});
-  table.add("gate", c.gate, "", "largest normalised innovation squared / 6 that is used", {0.1, 1e9});
+  table.add("innovation_gate", c.innovation_gate, "",
+            "largest normalised innovation squared / 6 of a registration that is used", {0.1, 1e9});
 }
 
 void HealthMonitor::start(TimeNs t) {
@@ -33,10 +36,10 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
     why = e.refused;
   } else if (!(e.sigma_px <= config_.lost_sigma_px)) {
     next = Health::lost;
-    why = text("pose uncertain by ", e.sigma_px, " px, beyond the capture range of ", config_.lost_sigma_px,
+    why = text("pose uncertain by ", e.sigma_px, " px, beyond the limit of ", config_.lost_sigma_px,
                " px");
     if (!e.refused.empty()) why += ": " + e.refused;
-  } else if (!any_accepted_ || to_seconds(e.t - started_) < config_.initialise_s) {
+  } else if (!any_accepted_ || to_seconds(e.t - started_) < kInitialise_s) {
     next = Health::initialising;
     why = "collecting events";
   } else if (silent_s > config_.degraded_after_s) {

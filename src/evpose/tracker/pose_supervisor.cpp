@@ -56,9 +56,9 @@ bool PoseSupervisor::search_is_due() const {
 std::string PoseSupervisor::refusal(TimeNs t, const RegistrationResult& r, double innovation) const {
   if (searching() || found_pose_is_refuted(t, r)) return "searching for the pose";
   if (r.points == 0) return "no map point in view";
-  if (r.inliers < health_config_.least_points)
+  if (r.inliers < kLeastInliers)
     return text("only ", r.inliers, " of ", r.points, " map points have events near by");
-  if (!(innovation <= health_config_.gate)) return "registration contradicts the prediction";
+  if (!(innovation <= health_config_.innovation_gate)) return "registration contradicts the prediction";
   return "";
 }
 

@@ -28,7 +28,7 @@ bool states_errors(const ContourMap& map) {
 /// The temporal field has a spacing of points of its own.
 VisibleSetConfig visible_config(const TrackerConfig& config) {
   VisibleSetConfig out = config.visible;
-  if (config.registration == RegistrationKind::temporal_field) out.stride_px = config.temporal_field.stride_px;
+  if (config.registration == RegistrationKind::temporal_field) out.stride_px = kFieldStride_px;
   return out;
 }
 

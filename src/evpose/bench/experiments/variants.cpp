@@ -13,7 +13,7 @@ namespace evpose::experiments {
 namespace {
 
 const std::vector<Variant> kBackEnds{
-    {"STPE alone", false, {"events.filter.on=false", "alignment.polarity=false"}},
+    {"STPE alone", false, {"events.filter.on=false", "registration.polarity=false"}},
     {"STPE with filter and polarity", false, {}},
     {"particle filter", true, {"fusion.kind=particle"}},
     {"EKF (full, the default)", true, {"fusion.kind=ekf"}},
@@ -23,27 +23,24 @@ const std::vector<Variant> kBackEnds{
      true,
      {"fusion.kind=graph", "fusion.coupling=tight", "fusion.window.background=true"}},
     {"EKF, gravity's direction", true, {"fusion.slow.gravity=true"}},
-    {"EKF, lasting offset", true, {"fusion.slow.pose_offset=true", "alignment.shared_s=0"}},
+    {"EKF, lasting offset", true, {"fusion.slow.pose_offset=true", "registration.correlation_time_s=0"}},
     {"EKF, offsets of segments", true, {"fusion.slow.piece_offset=on"}},
 };
 
 const std::vector<Variant> kAblation{
     {"all", true, {}},
     {"without noise filter", true, {"events.filter.on=false"}},
-    {"without polarity", true, {"alignment.polarity=false"}},
-    {"polarity without buffer zone", true, {"alignment.buffer_sigma=0"}},
-    {"with extraction of moving things", true, {"alignment.flow.on=true"}},
-    {"without edge delay", true, {"alignment.lateness=false"}},
-    {"without gate truncation correction", true, {"alignment.honest_slope=false"}},
-    {"gate opened by the prediction's sigma", true, {"alignment.widest_gate_px=6"}},
-    {"without ambiguity exclusion", true, {"alignment.ambiguity_px=0"}},
+    {"without polarity", true, {"registration.polarity=false"}},
+    {"polarity without buffer zone", true, {"registration.buffer_sigma=0"}},
+    {"with extraction of moving things", true, {"registration.ego_motion_test=true"}},
+    {"without edge delay", true, {"registration.edge_delay=false"}},
     {"without occlusion", true, {"visible.occlusion=false"}},
     {"without IMU", false, {}},
-    {"the paper's field", true, {"field=exponential"}},
-    {"the paper's field without IMU (STPE)", false, {"field=exponential"}},
-    {"the paper's field without IMU and noise filter",
+    {"temporal field", true, {"registration.kind=temporal_field"}},
+    {"temporal field without IMU (STPE)", false, {"registration.kind=temporal_field"}},
+    {"temporal field without IMU and noise filter",
      false,
-     {"field=exponential", "events.filter.on=false"}},
+     {"registration.kind=temporal_field", "events.filter.on=false"}},
 };
 
 struct Figures {

@@ -32,7 +32,7 @@ void update(benchmark::State& state) {
   config.rate_hz = kRate_hz;
   config.registration = state.range(3) == 0 ? RegistrationKind::events : RegistrationKind::temporal_field;
   // The random load must not move the pose, nor start a search for it; all stages run all the same.
-  config.health.gate = -1;
+  config.health.innovation_gate = -1;
   config.relocalization.on = false;
   config.fusion.cv_accel_density = config.fusion.cv_angular_density = 1e-3;
   config.fusion.start_position_sigma_m = config.fusion.start_rotation_sigma_rad = 3e-4;

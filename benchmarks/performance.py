@@ -69,7 +69,7 @@ def update_table(kernels):
         def quantiles(stage):
             return " / ".join(span(of(runs, f"{stage}_{q}_ms"), 2) for q in ("p50", "p99"))
 
-        rows.append([image(a), f"{a['Mev_s_in']} Mev/s", FIELDS[a["exponential"]], f"{runs[0]['points']:.0f}",
+        rows.append([image(a), f"{a['Mev_s_in']} Mev/s", FIELDS[a["temporal_field"]], f"{runs[0]['points']:.0f}",
                      quantiles("register"), quantiles("choose"), quantiles("pose"), span(of(runs, "events_p50_ms"), 2)])
     return tables.table(["image", "load", "field", "points", "registration", "choice of points", "newest event to pose",
                          "filter and surfaces"], rows)

@@ -79,7 +79,7 @@ class RecordingsTest(unittest.TestCase):
             for packet_ms, threads in ((0.1, 1), (1, 1), (10, 1), (1, 2), (10, 2)):
                 out = self.out / f"{field}_{packet_ms}_{threads}"
                 track(out, "room_people", "--set", f"packet_ms={packet_ms}", "--set", f"threads={threads}",
-                      "--set", f"field={field}", *occluders("room_people"))
+                      "--set", f"registration.kind={field}", *occluders("room_people"))
                 files[packet_ms, threads] = [(out / n).read_bytes() for n in
                                              ("trajectory.tum", "trajectory_camera.tum", "states.csv")]
             for settings, content in files.items():

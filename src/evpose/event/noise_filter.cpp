@@ -9,7 +9,7 @@
 namespace evpose {
 namespace {
 
-constexpr double kHotFactor = 20;         // times the median of active pixels: a pixel that fires by itself
+constexpr double kHotFactor = 20;          // times the median of active pixels: a pixel that fires by itself
 constexpr double kHotLeastPerSecond = 20;  // unsupported events of a hot pixel: below it does no harm
 
 }  // namespace

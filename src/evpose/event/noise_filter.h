@@ -72,10 +72,8 @@ class NoiseFilter {
     const Cell* const up = row - stride_;
     const Cell* const down = row + stride_;
     const auto later = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
-    const std::uint32_t a =
-        later(later(up[-1].last, up[0].last), later(up[1].last, row[-1].last));
-    const std::uint32_t b =
-        later(later(down[-1].last, down[0].last), later(down[1].last, row[1].last));
+    const std::uint32_t a = later(later(up[-1].last, up[0].last), later(up[1].last, row[-1].last));
+    const std::uint32_t b = later(later(down[-1].last, down[0].last), later(down[1].last, row[1].last));
     const std::uint32_t newest = later(a, b);
     // "Never" must not support the first moments of the clock.
     return newest == 0 ? 0 - support_us_ : newest;

@@ -89,7 +89,7 @@ AssociationIndex::Owner AssociationIndex::find(float x, float y, float age_us) c
 }
 
 void AssociationIndex::find_all(std::span<const FrontEvent> events, std::uint32_t now_us,
-                          std::vector<Found>* found) {
+                                std::vector<Found>* found) {
   // Most events are far from any contour: written in any case and kept by counting, as a branch would be
   // guessed wrong.
   close_.resize(events.size());
@@ -104,7 +104,7 @@ void AssociationIndex::find_all(std::span<const FrontEvent> events, std::uint32_
 }
 
 void AssociationIndex::find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
-                            std::uint32_t now_us, std::vector<Found>* found) const {
+                                  std::uint32_t now_us, std::vector<Found>* found) const {
   std::array<std::size_t, kSide> entry{};
   Floats x{}, y{}, age{};
   for (std::size_t l = 0; l < which.size(); ++l) {
@@ -128,9 +128,11 @@ void AssociationIndex::find_eight(std::span<const FrontEvent> events, std::span<
       return Floats{band[0]->*m, band[1]->*m, band[2]->*m, band[3]->*m,
                     band[4]->*m, band[5]->*m, band[6]->*m, band[7]->*m};
     };
-    const Floats dx = x - all(&AssociationBand::x), dy = y - all(&AssociationBand::y), nx = all(&AssociationBand::nx), ny = all(&AssociationBand::ny);
+    const Floats dx = x - all(&AssociationBand::x), dy = y - all(&AssociationBand::y),
+                 nx = all(&AssociationBand::nx), ny = all(&AssociationBand::ny);
     const Floats t = nx * dy - ny * dx, along = t < 0 ? -t : t;
-    const Floats d = nx * dx + ny * dy + (all(&AssociationBand::speed) - all(&AssociationBand::curvature) * age) * age;
+    const Floats d =
+        nx * dx + ny * dy + (all(&AssociationBand::speed) - all(&AssociationBand::curvature) * age) * age;
     const Floats across = d < 0 ? -d : d;
     const Ints hit = (along <= half_length_) & (across <= all(&AssociationBand::reach));
     const Ints nearer = hit & (across < least);

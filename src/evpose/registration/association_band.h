@@ -32,7 +32,7 @@ class AssociationIndex {
 
   struct Owner {
     std::int32_t band = -1;  ///< -1: none
-    float distance = 0;       ///< signed, px
+    float distance = 0;      ///< signed, px
   };
   /// Position inside the image.
   Owner find(float x, float y, float age_us) const;
@@ -65,7 +65,7 @@ class AssociationIndex {
 
   int columns_, rows_;
   float half_length_, ambiguity_;
-  std::vector<AssociationBand> bands_;         ///< and one more, which nothing is near
+  std::vector<AssociationBand> bands_;  ///< and one more, which nothing is near
   std::vector<Entry> entries_;        ///< the first is every list's end: it is of that band and its own next
   std::vector<std::int32_t> heads_;   ///< of each cell's list of entries
   std::vector<std::uint32_t> close_;  ///< events in cells with bands

@@ -43,7 +43,9 @@ AssociationIndex index_of(std::span<const AssociationBand> bands) {
 float distance(const AssociationBand& s, const Place& p) {
   return s.nx * (p.x - s.x) + s.ny * (p.y - s.y) + s.speed * p.age_us - s.curvature * p.age_us * p.age_us;
 }
-float along(const AssociationBand& s, const Place& p) { return std::abs(s.nx * (p.y - s.y) - s.ny * (p.x - s.x)); }
+float along(const AssociationBand& s, const Place& p) {
+  return std::abs(s.nx * (p.y - s.y) - s.ny * (p.x - s.x));
+}
 bool covers(const AssociationBand& s, const Place& p) {
   return std::abs(distance(s, p)) <= s.reach && along(s, p) <= kHalfLength_px;
 }
@@ -154,8 +156,8 @@ TEST(AssociationIndex, ManyEventsFindWhatEachFindsAlone) {
         EXPECT_NEAR(together.distance, alone.distance, 1e-3);
       } else {
         ++rounded;
-        EXPECT_TRUE(
-            std::any_of(bands.begin(), bands.end(), [&](const AssociationBand& s) { return on_border(s, p); }));
+        EXPECT_TRUE(std::any_of(bands.begin(), bands.end(),
+                                [&](const AssociationBand& s) { return on_border(s, p); }));
       }
     }
     EXPECT_EQ(next, found.size());

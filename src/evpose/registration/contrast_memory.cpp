@@ -37,9 +37,9 @@ double ContrastMemory::steps(std::uint32_t segment) const {
 
 ContrastMemory::EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
   const double n = std::abs(steps(segment));
-  const double delay = known(segment) ? std::min(kLargestDelay_px,
-                                                 kLeastDelay_px + kDelayByContrast_px / std::max(n, 1e-3))
-                                      : kUnknownDelay_px;
+  const double delay =
+      known(segment) ? std::min(kLargestDelay_px, kLeastDelay_px + kDelayByContrast_px / std::max(n, 1e-3))
+                     : kUnknownDelay_px;
   // Where the logarithm is halfway between both sides, of a pixel's width; s: square root of their ratio.
   const double s = std::exp(0.5 * n * threshold_);
   const double towards_dark = 0.5 - 1 / (1 + s);

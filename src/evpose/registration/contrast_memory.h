@@ -6,9 +6,9 @@
 
 namespace evpose {
 
-/// What events have told about the brightness step across each contrast segment of the contours (EV-Pose 5.1):
-/// in every pixel that a step sweeps, on less off events number log(contrast) / threshold, whatever texture
-/// lies around it. The sign predicts polarities, the size how late events come.
+/// What events have told about the brightness step across each contrast segment of the contours
+/// (EV-Pose 5.1): in every pixel that a step sweeps, on less off events number log(contrast) / threshold,
+/// whatever texture lies around it. The sign predicts polarities, the size how late events come.
 class ContrastMemory {
  public:
   /// `threshold`: of the camera, in log luminance.

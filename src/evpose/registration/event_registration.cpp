@@ -13,19 +13,20 @@ constexpr double kContourPrior = 0.5;  // an event in the gate is of the contour
 // Samples stand at least 4 px apart along a contour: each answers for half of that to either side, and more
 // where samples are left out.
 constexpr double kHalfLength_px = 4;
-constexpr double kAmbiguity_px = 1;      // events as near to two contours as this are left out
-constexpr double kSureContrast = 0.3;    // thresholds of contrast from which on a polarity is predicted
-constexpr double kFullDelay_px_s = 20;   // below this flow the edge delay fades out: noise, not the edge, triggers
+constexpr double kAmbiguity_px = 1;    // events as near to two contours as this are left out
+constexpr double kSureContrast = 0.3;  // thresholds of contrast from which on a polarity is predicted
+constexpr double kFullDelay_px_s =
+    20;  // below this flow the edge delay fades out: noise, not the edge, triggers
 constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a contour and still be found
-constexpr int kClustersPerWidth = 20;    // cells whose events share an error: 32 px at VGA
+constexpr int kClustersPerWidth = 20;     // cells whose events share an error: 32 px at VGA
 
 // Gate concentration.
-constexpr double kGateRim = 0.8;         // events beyond this share of the gate tell the density at it
-constexpr double kMemory_s = 0.05;       // of the sums, while many events come
-constexpr double kLongestMemory_s = 1;   // of the sums, while few events come
-constexpr double kEnoughWeight = 50;     // of events, from which on the concentration is believed
+constexpr double kGateRim = 0.8;              // events beyond this share of the gate tell the density at it
+constexpr double kMemory_s = 0.05;            // of the sums, while many events come
+constexpr double kLongestMemory_s = 1;        // of the sums, while few events come
+constexpr double kEnoughWeight = 50;          // of events, from which on the concentration is believed
 constexpr double kLeastConcentration = 0.15;  // keeps the correction finite
-constexpr double kConsistent = 0.3;      // concentration of events that are of the contours
+constexpr double kConsistent = 0.3;           // concentration of events that are of the contours
 
 constexpr std::uint32_t kProbeEvery = 4;  // calls after which a sample's owned area is probed again
 
@@ -35,20 +36,24 @@ void describe(ConfigTable& table, EventRegistrationConfig& c) {
   table.add("gate_px", c.gate_px, "px",
             "events within this, joined with two sigma of the map, belong to a contour", {0.1, 50});
   table.add("event_sigma_px", c.event_sigma_px, "px", "scatter of a contour's events", {0.05, 10});
-  table.add("correlated_sigma_px", c.correlated_sigma_px, "px", "error that neighbouring events share", {0, 10});
+  table.add("correlated_sigma_px", c.correlated_sigma_px, "px", "error that neighbouring events share",
+            {0, 10});
   table.add("correlation_time_s", c.correlation_time_s, "s", "how long such an error lasts", {0, 100});
   table.add("map_sigma_m", c.map_sigma_m, "m", "error across the contour of map points that state none",
             {0, 1});
   table.add("edge_delay", c.edge_delay, "take off that events come after the contour");
   table.add("polarity", c.polarity, "leave out events whose polarity contrast and flow exclude");
   table.add("buffer_sigma", c.buffer_sigma, "",
-            "both polarities count where the normal flow is less sigma from zero (adaptive buffer zone)", {0, 100});
-  table.add("ego_motion_test", c.ego_motion_test, "mistrust cells whose events do not move as the ego-motion says");
-  table.add("contrast_threshold", c.contrast_threshold, "", "of the camera: log luminance step that makes an event",
-            {0.01, 2});
+            "both polarities count where the normal flow is less sigma from zero (adaptive buffer zone)",
+            {0, 100});
+  table.add("ego_motion_test", c.ego_motion_test,
+            "mistrust cells whose events do not move as the ego-motion says");
+  table.add("contrast_threshold", c.contrast_threshold, "",
+            "of the camera: log luminance step that makes an event", {0.01, 2});
 }
 
-EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConfig& config, std::uint32_t segments)
+EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConfig& config,
+                                     std::uint32_t segments)
     : size_(size),
       config_(config),
       index_(size, kHalfLength_px, kAmbiguity_px),
@@ -76,7 +81,8 @@ bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) cons
 }
 
 /// Gate, edge delay, weight and excluded polarities of one sample.
-EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance, double gate) const {
+EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance,
+                                                   double gate) const {
   const double variance =
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
   const double odds = kContourPrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kContourPrior);

@@ -19,16 +19,16 @@ namespace evpose {
 class ConfigTable;
 
 struct EventRegistrationConfig {
-  double gate_px = 0.5;              ///< an event belongs to a contour within this and two sigma of the map
-  double event_sigma_px = 0.7;       ///< scatter of a contour's events about it
+  double gate_px = 0.5;               ///< an event belongs to a contour within this and two sigma of the map
+  double event_sigma_px = 0.7;        ///< scatter of a contour's events about it
   double correlated_sigma_px = 0.35;  ///< error that the events of a cell and direction share
   double correlation_time_s = 0.025;  ///< how long such an error lasts
   double map_sigma_m = 0.5e-3;        ///< of map points that state no sigma
   bool edge_delay = true;             ///< events come after the contour, by contrast and polarity
   bool polarity = true;               ///< leave out events of the polarity that contrast and flow exclude
-  double buffer_sigma = 3;            ///< both polarities count where the flow is nearer to zero (EV-Pose 5.1)
-  bool ego_motion_test = false;       ///< mistrust cells whose events move otherwise (EV-Pose 5.3)
-  double contrast_threshold = 0.25;   ///< of the camera, in log luminance
+  double buffer_sigma = 3;           ///< both polarities count where the flow is nearer to zero (EV-Pose 5.1)
+  bool ego_motion_test = false;      ///< mistrust cells whose events move otherwise (EV-Pose 5.3)
+  double contrast_threshold = 0.25;  ///< of the camera, in log luminance
 
   // Not for users: the relocalizer's wide stages differ in these.
   double widest_gate_px = 0.55;            ///< two sigma of the prediction open the gate, but no further
@@ -43,8 +43,8 @@ void describe(ConfigTable& table, EventRegistrationConfig& config);
 /// from the contour sample that claims its pixel; d is zero-mean Gaussian for events of the contour and
 /// uniform over the gate for clutter (soft assignment). The gate is tight: a wide one was measured to hand
 /// the pose to texture beside the contours. It follows the map's sigma. A gate truncates: events that an
-/// offset moves out of it no longer tell of the offset. How much is lost follows from the density of events at
-/// the gate and is taken off the information (gate truncation correction). Events of a cell and direction
+/// offset moves out of it no longer tell of the offset. How much is lost follows from the density of events
+/// at the gate and is taken off the information (gate truncation correction). Events of a cell and direction
 /// share errors that last; their information is capped accordingly.
 class EventRegistration final : public Registration {
  public:

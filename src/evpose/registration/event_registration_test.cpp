@@ -190,7 +190,8 @@ TEST_F(EventRegistrationLaws, InformationOfOneClusterIsBounded) {
   }
   EXPECT_GT(information[1], information[0]);
   const double repeats = config_.correlation_time_s / kSpan_s;
-  const double bound = kFocal * kFocal / (repeats * config_.correlated_sigma_px * config_.correlated_sigma_px);
+  const double bound =
+      kFocal * kFocal / (repeats * config_.correlated_sigma_px * config_.correlated_sigma_px);
   EXPECT_LT(information[3], bound);
   EXPECT_GT(information[3], 0.9 * bound * 0.99);
 }

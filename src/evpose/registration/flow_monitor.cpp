@@ -7,14 +7,15 @@
 namespace evpose {
 namespace {
 
-constexpr float kBehind_px = 2.5F;  // where the edge's earlier event is looked for
+constexpr float kBehind_px = 2.5F;                // where the edge's earlier event is looked for
 constexpr float kSoonest = 0.5F, kLatest = 2.0F;  // of the predicted time from there: agreement
 constexpr float kFrom_px_s = 20;    // slower contours tell nothing: noise overwrites their traces
 constexpr double kMemory_s = 0.05;  // over which events of a cell are judged together
 constexpr double kFew = 10;         // events that tell nothing yet
-constexpr double kLeastDeficit = 0.15, kFullDeficit = 0.3;  // missing share of agreement: mistrust begins, is full
-constexpr double kSureSigma = 3;    // from chance, for a deficit to count
-constexpr double kMistrust_s = 0.1;  // decay time of mistrust
+constexpr double kLeastDeficit = 0.15,
+                 kFullDeficit = 0.3;  // missing share of agreement: mistrust begins, is full
+constexpr double kSureSigma = 3;      // from chance, for a deficit to count
+constexpr double kMistrust_s = 0.1;   // decay time of mistrust
 
 }  // namespace
 
@@ -50,8 +51,8 @@ double FlowMonitor::trust(std::uint32_t cell) {
     const double usual = image_.agree / image_.all, missing = usual - c.agree / c.all;
     const double chance = std::sqrt(usual * (1 - usual) / c.all);
     if (missing > kSureSigma * chance)
-      c.mistrust = std::max(
-          c.mistrust, std::clamp((missing - kLeastDeficit) / (kFullDeficit - kLeastDeficit), 0.0, 1.0));
+      c.mistrust = std::max(c.mistrust,
+                            std::clamp((missing - kLeastDeficit) / (kFullDeficit - kLeastDeficit), 0.0, 1.0));
   }
   return 1 - c.mistrust;
 }

@@ -16,7 +16,8 @@ class FlowMonitor {
  public:
   enum class Answer : std::uint8_t { unknown, agrees, differs };
   /// Of one event near a contour with the image normal n and this speed along it.
-  static Answer compare(const TimeSurface& surface, const FrontEvent& event, float nx, float ny, float speed_px_s);
+  static Answer compare(const TimeSurface& surface, const FrontEvent& event, float nx, float ny,
+                        float speed_px_s);
 
   /// Lets what was seen so far count less.
   void advance(double span_s);

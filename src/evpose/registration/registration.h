@@ -78,7 +78,8 @@ class Registration {
   virtual void restart() {}
   /// Whether `measure` wants the time surface.
   virtual bool reads_surface() const = 0;
-  /// Of the last measurement: its information and vector, sample by sample; none if it is no sum over samples.
+  /// Of the last measurement: its information and vector, sample by sample; none if it is no sum over
+  /// samples.
   virtual std::span<const SampleOffset> offsets() const { return {}; }
   /// What has been learnt of the contours' contrast; null if nothing is.
   virtual const ContrastMemory* contrast() const { return nullptr; }

@@ -61,8 +61,7 @@ double information_scale(const TemporalFieldConfig& c) {
   return 1 / (c.noise * c.noise * c.correlated_points);
 }
 
-void fill(const FieldProblem& problem, double scale, const NormalEquations& normal,
-          FieldSolution* result) {
+void fill(const FieldProblem& problem, double scale, const NormalEquations& normal, FieldSolution* result) {
   result->information = scale * normal.H;
   result->vector =
       scale * normal.b + result->information * result->T_map_body.minus(problem.T_map_body_predicted);
@@ -158,8 +157,8 @@ RegistrationResult TemporalFieldRegistration::measure(const RegistrationProblem&
     points_.push_back({p.view->map.position(s.point), 1e6 * decay_s});
   }
   const Matrix6d prior = p.pose_covariance.ldlt().solve(Matrix6d::Identity());
-  const FieldProblem problem{*p.surface, p.view->camera, p.view->T_body_cam, points_,
-                             p.now_us,   p.T_map_body,   prior};
+  const FieldProblem problem{*p.surface,   p.view->camera, p.view->T_body_cam, points_, p.now_us,
+                             p.T_map_body, prior};
   const FieldSolution solution = minimise(problem, config_, pool_);
   RegistrationResult result;
   result.information = solution.information;

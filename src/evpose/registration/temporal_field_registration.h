@@ -79,7 +79,8 @@ bool evaluate_point(const FieldProblem& problem, FieldKernel kernel, const Pose&
 /// The paper's registration: contour samples on the temporal distance field.
 class TemporalFieldRegistration final : public Registration {
  public:
-  TemporalFieldRegistration(const TemporalFieldConfig& config, int threads) : config_(config), pool_(threads) {}
+  TemporalFieldRegistration(const TemporalFieldConfig& config, int threads)
+      : config_(config), pool_(threads) {}
 
   RegistrationResult measure(const RegistrationProblem& problem) override;
   bool reads_surface() const override { return true; }

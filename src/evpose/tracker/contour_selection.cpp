@@ -16,9 +16,9 @@ double median(std::vector<double>& values) {
 
 }  // namespace
 
-ContourSelection::ContourSelection(const ContourIndex& index, const ContourSegments& segments, const Camera& camera,
-                                   const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m,
-                                   bool own_thread)
+ContourSelection::ContourSelection(const ContourIndex& index, const ContourSegments& segments,
+                                   const Camera& camera, const Pose& T_body_cam,
+                                   const VisibleSetConfig& config, double map_sigma_m, bool own_thread)
     : view_{index.map(), segments, camera, T_body_cam, map_sigma_m},
       visible_(index, camera, config, own_thread) {}
 

@@ -15,7 +15,8 @@ class ContourSelection {
  public:
   /// `map_sigma_m`: of contour points that state none. References are kept, but for the configuration.
   ContourSelection(const ContourIndex& index, const ContourSegments& segments, const Camera& camera,
-                   const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m, bool own_thread);
+                   const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m,
+                   bool own_thread);
 
   /// The first choice of points is the dearest: made before the data come.
   void prepare(const Pose& T_map_body) { visible_.choose(T_map_body * view_.T_body_cam); }

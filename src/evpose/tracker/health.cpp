@@ -6,7 +6,8 @@
 namespace evpose {
 namespace {
 
-constexpr double kInitialise_s = 0.05;  // accepted registrations for so long make "tracking" of "initialising"
+constexpr double kInitialise_s =
+    0.05;  // accepted registrations for so long make "tracking" of "initialising"
 
 }  // namespace
 
@@ -36,8 +37,7 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
     why = e.refused;
   } else if (!(e.sigma_px <= config_.lost_sigma_px)) {
     next = Health::lost;
-    why = text("pose uncertain by ", e.sigma_px, " px, beyond the limit of ", config_.lost_sigma_px,
-               " px");
+    why = text("pose uncertain by ", e.sigma_px, " px, beyond the limit of ", config_.lost_sigma_px, " px");
     if (!e.refused.empty()) why += ": " + e.refused;
   } else if (!any_accepted_ || to_seconds(e.t - started_) < kInitialise_s) {
     next = Health::initialising;

@@ -11,13 +11,14 @@ namespace evpose {
 
 class ConfigTable;
 
-inline constexpr int kLeastInliers = 12;  ///< contour samples with events; fewer do not hold a pose of six degrees
+inline constexpr int kLeastInliers =
+    12;  ///< contour samples with events; fewer do not hold a pose of six degrees
 
 struct HealthConfig {
   double degraded_after_s = 0.1;   ///< without an accepted registration
   double degraded_sigma_px = 2.0;  ///< pose uncertainty, as image motion of the typical point
   double lost_sigma_px = 8.0;      ///< beyond what the registration can correct
-  double innovation_gate = 25;     ///< largest normalised innovation squared / 6 of a registration that is used
+  double innovation_gate = 25;  ///< largest normalised innovation squared / 6 of a registration that is used
 };
 void describe(ConfigTable& table, HealthConfig& config);
 

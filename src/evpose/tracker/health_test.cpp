@@ -274,7 +274,7 @@ class AgreementLaws : public ::testing::Test {
       // An estimate that explains the difference away by a bias, or one that does not.
       state.gyro_bias = absorb ? Eigen::Vector3d(0.5 * (a.gyro + b.gyro) - rate(s - 5e-4)) : bias;
       state.accel_bias = bias;
-      agreement.step(a, b, state, gravity, noise);
+      agreement.add_step(a, b, state, gravity, noise);
       state.nav.T_map_body.q = (state.nav.T_map_body.q * so3::exp(1e-3 * rate(s - 5e-4))).normalized();
       state.nav.T_map_body.p += 1e-3 * velocity + 5e-7 * push(s - 5e-4);
       velocity += 1e-3 * push(s - 5e-4);

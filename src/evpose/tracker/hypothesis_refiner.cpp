@@ -45,7 +45,6 @@ HypothesisRefiner::HypothesisRefiner(const RelocalizerScene& scene, const Hypoth
       camera_(scene.camera),
       map_sigma_m_(scene.registration.map_sigma_m),
       visible_(index_, camera_, points_to_refine(scene.visible)) {
-  
   for (const double gate_px : kGates_px)
     registrations_.emplace_back(camera_.size(), under_gate(scene.registration, gate_px), segments_.count);
 }

@@ -11,8 +11,8 @@
 #include "evpose/imu/strapdown.h"
 #include "evpose/map/contour_segments.h"
 #include "evpose/map/visible_set.h"
-#include "evpose/registration/event_registration.h"
 #include "evpose/registration/contour_view.h"
+#include "evpose/registration/event_registration.h"
 #include "evpose/tracker/pose_hypothesis.h"
 
 namespace evpose {
@@ -23,8 +23,8 @@ struct RelocalizerScene {
   const ContourIndex& index;
   const ContourSegments& segments;
   const Camera& camera;
-  Eigen::Vector3d gravity_map;     ///< zero when there is no IMU
-  VisibleSetConfig visible;        ///< the search has its own number and spacing of points
+  Eigen::Vector3d gravity_map;           ///< zero when there is no IMU
+  VisibleSetConfig visible;              ///< the search has its own number and spacing of points
   EventRegistrationConfig registration;  ///< the search has its own gates and leaves polarity out
 };
 
@@ -73,7 +73,7 @@ class HypothesisRefiner {
   double map_sigma_m_;
   VisibleSet visible_;
   std::deque<EventRegistration> registrations_;  ///< from a wide gate to the tracker's
-  std::deque<Interval> intervals_;          ///< the newest last
+  std::deque<Interval> intervals_;               ///< the newest last
   std::vector<ContourSample> samples_;
 };
 

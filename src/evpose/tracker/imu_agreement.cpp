@@ -24,7 +24,7 @@ void describe(ConfigTable& table, ImuAgreementConfig& c) {
 }
 
 void ImuAgreement::add_step(const ImuSample& a, const ImuSample& b, const FusionState& from,
-                        const Eigen::Vector3d& gravity_map, const ImuNoise& noise) {
+                            const Eigen::Vector3d& gravity_map, const ImuNoise& noise) {
   const ImuIncrement step = integrate(a, b, from.gyro_bias, from.accel_bias);
   now_.integral = (now_.integral * step.dq).normalized();
   now_.bias_integral += step.dt_s * from.gyro_bias;
@@ -90,8 +90,7 @@ double ImuAgreement::judge(const FusionState& state, bool doubted) {
   now_.force_bias = state.accel_bias;
   now_.position_variance = worst(kP);
   now_.force_bias_variance = worst(kBa);
-  const Moment *turned = before(kTurns_s), *middle = before(0.5 * kForces_s),
-               *begin = before(kForces_s);
+  const Moment *turned = before(kTurns_s), *middle = before(0.5 * kForces_s), *begin = before(kForces_s);
   const double sigmas = std::max(turned != nullptr ? turn_difference(*turned) : 0,
                                  begin != nullptr ? bend_difference(*begin, *middle) : 0);
   if (!(sigmas <= config_.contradiction_sigma * (doubted ? kDoubtedShare : 1)))

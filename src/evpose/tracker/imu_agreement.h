@@ -28,7 +28,7 @@ class ImuAgreement {
   void restart() { past_.clear(), first_ = 0; }
   /// A step of the IMU from the estimate's time on, with the densities of its noise.
   void add_step(const ImuSample& a, const ImuSample& b, const FusionState& from,
-            const Eigen::Vector3d& gravity_map, const ImuNoise& noise);
+                const Eigen::Vector3d& gravity_map, const ImuNoise& noise);
   /// The estimate after an update, and whether the IMU's stamps are doubted. The difference in standard
   /// deviations; 0 while there is too little to tell.
   double judge(const FusionState& state, bool doubted);

@@ -34,15 +34,16 @@ ImuTrust ImuGate::trust(const CheckedImu& a, const CheckedImu& b, TimeNs t) cons
   return a.doubted || b.doubted ? std::max(reading, ImuTrust::suspect) : reading;
 }
 
-ImuSample ImuGate::held_reading(TimeNs t, const FusionState& state, const Eigen::Vector3d& gravity_map) const {
+ImuSample ImuGate::held_reading(TimeNs t, const FusionState& state,
+                                const Eigen::Vector3d& gravity_map) const {
   return {t, held_gyro_, state.accel_bias - state.nav.T_map_body.q.conjugate() * gravity_map};
 }
 
 /// If no sample is near after t, puts one at t that repeats the last reading, to be distrusted. True if so.
 /// Which samples have arrived beyond the patience makes no difference.
 bool ImuGate::hold_over_silence(TimeNs t, const BackEnd& fusion) {
-  const auto next = std::find_if(samples_.begin(), samples_.end(),
-                                 [t](const CheckedImu& s) { return s.sample.t >= t; });
+  const auto next =
+      std::find_if(samples_.begin(), samples_.end(), [t](const CheckedImu& s) { return s.sample.t >= t; });
   if (next != samples_.end() && next->sample.t <= t + kPatience) return false;
   CheckedImu held;
   if (next == samples_.begin()) {
@@ -102,8 +103,9 @@ void ImuGate::begin_samples_at(TimeNs t) {
 void ImuGate::step(BackEnd& fusion, const CheckedImu& a, const CheckedImu& b, TimeNs t, ImuIncrement* moved) {
   const FusionState& state = fusion.state();
   const Eigen::Vector3d& gravity_map = fusion.propagator().gravity_map();
-  agreement_.add_step(a.sample, b.sample, with_imu_biases(state), gravity_map,
-                      fusion.propagator().noise_at(b.sample.gyro, b.sample.accel, std::max(a.trust, b.trust)));
+  agreement_.add_step(
+      a.sample, b.sample, with_imu_biases(state), gravity_map,
+      fusion.propagator().noise_at(b.sample.gyro, b.sample.accel, std::max(a.trust, b.trust)));
   *moved = joined(*moved, integrate(a.sample, b.sample, state.gyro_bias, state.accel_bias));
   const bool held = contradicts(t);
   fusion.predict(held ? held_reading(a.sample.t, state, gravity_map) : a.sample,
@@ -134,8 +136,7 @@ ImuIncrement ImuGate::predict(BackEnd& fusion, TimeNs t) {
 }
 
 void ImuGate::compare(const BackEnd& fusion) {
-  if (model_ == MotionModel::imu)
-    agreement_.judge(with_imu_biases(fusion.state()), samples_.front().doubted);
+  if (model_ == MotionModel::imu) agreement_.judge(with_imu_biases(fusion.state()), samples_.front().doubted);
 }
 
 }  // namespace evpose

@@ -21,9 +21,10 @@ void ImuRateOutput::report_until(TimeNs until, const BackEnd& fusion, const ImuG
     const TimeNs t = fusion.state().t;
     const Eigen::Vector3d& gravity_map = fusion.propagator().gravity_map();
     const bool held = gate.contradicts(t);
-    fusion.propagator().propagate(state_, held ? gate.held_reading(reading_.t, state_, gravity_map) : reading_,
-                         held ? gate.held_reading(next.sample.t, state_, gravity_map) : next.sample,
-                         gate.trust(next, next, t));
+    fusion.propagator().propagate(state_,
+                                  held ? gate.held_reading(reading_.t, state_, gravity_map) : reading_,
+                                  held ? gate.held_reading(next.sample.t, state_, gravity_map) : next.sample,
+                                  gate.trust(next, next, t));
     reading_ = next.sample;
     callback_(state_);
   }

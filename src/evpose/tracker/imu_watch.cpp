@@ -11,11 +11,12 @@ namespace {
 
 constexpr std::array<const char*, 6> kAxes{"gyroscope x",     "gyroscope y",     "gyroscope z",
                                            "accelerometer x", "accelerometer y", "accelerometer z"};
-constexpr double kGapPeriods = 3.5;    // an interval of so many usual ones is a gap
-constexpr double kRegular = 2;         // intervals up to so many usual ones teach the usual one
-constexpr int kClippedSamples = 4;     // so many equal readings at the largest value yet: saturated below its range
-constexpr int kStuckSamples = 12;      // so many equal readings of one axis while others change: stuck
-constexpr double kLeastClip[] = {1, 15};     // rad/s, m/s^2: smaller readings are not taken as clipped
+constexpr double kGapPeriods = 3.5;  // an interval of so many usual ones is a gap
+constexpr double kRegular = 2;       // intervals up to so many usual ones teach the usual one
+constexpr int kClippedSamples =
+    4;  // so many equal readings at the largest value yet: saturated below its range
+constexpr int kStuckSamples = 12;         // so many equal readings of one axis while others change: stuck
+constexpr double kLeastClip[] = {1, 15};  // rad/s, m/s^2: smaller readings are not taken as clipped
 // A reading may be a spike if it is off the last one by so many usual changes, by more than a vehicle can do
 // in the time, and by enough to do harm. It is one if fewer than kSpikeSamples in a row are off: more are a
 // change of the motion.
@@ -40,8 +41,7 @@ void describe(ConfigTable& table, ImuWatchConfig& c) {
 }
 
 void ImuWatch::tell(TimeNs t, std::string what, TimeNs until) {
-  while (!told_.empty() && to_seconds(t - told_.front().t) > kLongestLead_s + kRemember_s)
-    told_.pop_front();
+  while (!told_.empty() && to_seconds(t - told_.front().t) > kLongestLead_s + kRemember_s) told_.pop_front();
   if (!told_.empty() && told_.back().t >= t) return;  // the first sign of one instant is kept
   told_.push_back({t, std::max(t, until), std::move(what)});
 }
@@ -103,8 +103,8 @@ void ImuWatch::repair(Kept* now) {
     equal_[k] = value == axis(last_, i) ? equal_[k] + 1 : 0;
     if (equal_[k] + 1 >= kStuckSamples) ++stuck, stuck_at = i;
     const double range = i < 3 ? config_.gyro_range_rad_s : config_.accel_range_m_s2;
-    const bool clipped = equal_[k] + 1 >= kClippedSamples && magnitude >= largest_[k] &&
-                         magnitude > kLeastClip[sensor];
+    const bool clipped =
+        equal_[k] + 1 >= kClippedSamples && magnitude >= largest_[k] && magnitude > kLeastClip[sensor];
     const double usual = std::sqrt(mean_square_[sensor]);
     if (magnitude >= range || clipped) {
       axis(now->checked.sample, i) = axis(good_, i);

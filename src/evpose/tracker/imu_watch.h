@@ -24,7 +24,8 @@ void describe(ConfigTable& table, ImuWatchConfig& config);
 /// them.
 struct CheckedImu {
   ImuSample sample;
-  /// Of its reading; suspect also if the time since the one before is too long; none: there is no such sample.
+  /// Of its reading; suspect also if the time since the one before is too long; none: there is no such
+  /// sample.
   ImuTrust trust = ImuTrust::good;
   bool doubted = false;  ///< its stamp may be wrong
 };

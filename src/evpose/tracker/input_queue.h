@@ -12,7 +12,8 @@ namespace evpose {
 /// Seconds on any monotone clock; for the times of stages alone, nothing in the estimate depends on it.
 using StageClock = std::function<double()>;
 
-/// Event packets on their way to the noise filter: hands on what belongs before an update, holds back the rest.
+/// Event packets on their way to the noise filter: hands on what belongs before an update, holds back the
+/// rest.
 class InputQueue {
  public:
   InputQueue(EventFront& front, StageClock clock) : front_(front), clock_(std::move(clock)) {}

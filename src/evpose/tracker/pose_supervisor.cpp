@@ -90,7 +90,8 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.refused = e.refused;
   evidence.searching = pose_is_unconfirmed(e.t, e.registration);
   evidence.sigma_px = uncertainty.sigma_px();
-  if (evidence.sigma_px > health_config_.degraded_sigma_px) evidence.weakest = uncertainty.weakest_direction();
+  if (evidence.sigma_px > health_config_.degraded_sigma_px)
+    evidence.weakest = uncertainty.weakest_direction();
   evidence.fault = e.fault;
   const Health health = health_.judge(evidence, reason);
   astray_s_ = is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;

@@ -23,12 +23,16 @@ struct UpdateEvidence {
   double focal_px = 0;
 };
 
-/// Owns the decision whether the pose is known: searches it when it is not, verifies one that was found, notices
-/// when it has gone astray, and names the tracker's health.
+/// Owns the decision whether the pose is known: searches it when it is not, verifies one that was found,
+/// notices when it has gone astray, and names the tracker's health.
 class PoseSupervisor {
  public:
-  PoseSupervisor(const RelocalizationConfig& relocalization, const HealthConfig& health, Relocalizer relocalizer)
-      : config_(relocalization), health_config_(health), relocalizer_(std::move(relocalizer)), health_(health) {}
+  PoseSupervisor(const RelocalizationConfig& relocalization, const HealthConfig& health,
+                 Relocalizer relocalizer)
+      : config_(relocalization),
+        health_config_(health),
+        relocalizer_(std::move(relocalizer)),
+        health_(health) {}
 
   /// Begins with the fusion's first state; searches for the pose if that is too unsure.
   void start(const FusionState& first, double sigma_px);

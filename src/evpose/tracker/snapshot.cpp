@@ -33,8 +33,9 @@ std::vector<Snapshot::Point> project_points(const ContourView& view, std::span<c
     const auto pixel = view.camera.project(T_cam_map * view.map.position(i));
     if (!pixel || !size.contains(*pixel)) continue;
     const double field =
-        surface == nullptr ? 0
-                           : sample_field(*surface, *pixel, now_us, 1e6 * decay_s, FieldKernel::bilinear).value;
+        surface == nullptr
+            ? 0
+            : sample_field(*surface, *pixel, now_us, 1e6 * decay_s, FieldKernel::bilinear).value;
     out.push_back({static_cast<float>(pixel->x()), static_cast<float>(pixel->y()), field >= kMatchedField});
   }
   return out;

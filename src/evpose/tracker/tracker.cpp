@@ -19,7 +19,9 @@ double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
 /// As maps that are built from clouds do.
 bool states_errors(const ContourMap& map) {
   const auto counts = [](const ContourPoint& point) { return !is_view_dependent(point.kind); };
-  const auto states = [](const ContourPoint& point) { return !is_view_dependent(point.kind) && point.sigma > 0; };
+  const auto states = [](const ContourPoint& point) {
+    return !is_view_dependent(point.kind) && point.sigma > 0;
+  };
   const auto& points = map.points;
   return 2 * std::count_if(points.begin(), points.end(), states) >
          std::count_if(points.begin(), points.end(), counts);
@@ -140,9 +142,11 @@ Update Tracker::update(TimeNs t) {
   reporter_.end_stage(&StageTimes::predict_s);
   contours_.choose(fusion_->state(), span_s);  // EV-Pose 5.3
   reporter_.end_stage(&StageTimes::choose_s);
-  const RegistrationResult stpe = supervisor_.searching() ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
+  const RegistrationResult stpe =
+      supervisor_.searching() ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
   reporter_.end_stage(&StageTimes::register_s);
-  const double innovation = evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
+  const double innovation =
+      evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
   // When the time offset found has fallen by more than an update, this update's time is past.
   const std::string refused =
       imu_time(t) < from ? "the time offset has changed" : supervisor_.refusal(t, stpe, innovation);
@@ -195,7 +199,8 @@ void Tracker::fuse(const RegistrationResult& measurement) {
   T_body_cam_ = {found.turn * setup_.T_body_cam.q, setup_.T_body_cam.p + found.shift};
 }
 
-void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused) {
+void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement,
+                    const std::string& refused) {
   const Matrix6d covariance = fusion_->state().pose_covariance();
   std::string reason;
   const Health health = supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement),

@@ -112,7 +112,7 @@ class Tracker {
   std::function<void(const Update&)> update_callback_;
   VerdictCallback verdict_callback_;
   std::vector<EventVerdict> verdicts_;
-  std::vector<ContourOffset> offsets_;        ///< of the last measurement, for a fusion that takes them
+  std::vector<ContourOffset> offsets_;          ///< of the last measurement, for a fusion that takes them
   std::vector<std::uint32_t> offset_segments_;  ///< of each map point, where segments have offsets
 
   TimeNs start_t_, last_update_, next_update_;

@@ -12,7 +12,8 @@
 
 namespace evpose {
 
-/// All settings of the tracker. Each is described once, with its unit and bounds, by the describe() of its struct.
+/// All settings of the tracker. Each is described once, with its unit and bounds, by the describe() of its
+/// struct.
 struct TrackerConfig {
   double rate_hz = 300;
   int threads = 1;

@@ -30,8 +30,7 @@ struct EventRegistrationConfig {
   bool ego_motion_test = false;      ///< mistrust cells whose events move otherwise (EV-Pose 5.3)
   double contrast_threshold = 0.25;  ///< of the camera, in log luminance
 
-  // Not for users: the relocalizer's wide stages differ in these.
-  double widest_gate_px = 0.55;            ///< two sigma of the prediction open the gate, but no further
+  // Not for users: the relocalizer's stages differ in these.
   double contrast_band_px = 1.5;           ///< events so near teach the contrast
   bool gate_truncation_correction = true;  ///< take off the information that the gate hides
 };

@@ -20,7 +20,6 @@ class EventRegistrationLaws : public ::testing::Test {
   EventRegistrationLaws() {
     config_.edge_delay = false;
     config_.gate_truncation_correction = false;
-    config_.widest_gate_px = 6;
     config_.map_sigma_m = 0;
     covariance_.setZero();
   }
@@ -111,19 +110,13 @@ TEST_F(EventRegistrationLaws, EdgeDelayIsTakenOffInTheDirectionOfMotion) {
   }
 }
 
-TEST_F(EventRegistrationLaws, GateOpensWithThePredictionsUncertainty) {
+TEST_F(EventRegistrationLaws, GateOpensWithTheMapsSigmaAndNotWithThePredictions) {
   add_line({150, 40}, {1, 0}, 0);
   add_event({152, 60}, 0);
   EXPECT_EQ(measure().events, 0);
-  covariance_(0, 0) = std::pow(1.0 / kFocal, 2);  // 1 px
-  EXPECT_EQ(measure().events, 1);
-}
-
-TEST_F(EventRegistrationLaws, GateNeverOpensBeyondItsBound) {
-  add_line({150, 40}, {1, 0}, 0);
-  add_event({150 + config_.widest_gate_px + 1, 60}, 0);
-  add_event({150 + config_.widest_gate_px - 1, 64}, 0);
-  covariance_(0, 0) = std::pow(100 / kFocal, 2);
+  covariance_(0, 0) = std::pow(10.0 / kFocal, 2);
+  EXPECT_EQ(measure().events, 0);
+  for (auto& s : samples_) s.map_sigma_px = 1;
   EXPECT_EQ(measure().events, 1);
 }
 

@@ -30,7 +30,7 @@ VisibleSetConfig points_to_refine(VisibleSetConfig config) {
 
 /// Contrast is not known from a pose that may be wrong, so polarity is not asked.
 EventRegistrationConfig under_gate(EventRegistrationConfig config, double gate_px) {
-  config.gate_px = config.widest_gate_px = gate_px;
+  config.gate_px = gate_px;
   config.contrast_band_px = kContrastReach_px;
   config.polarity = config.gate_truncation_correction = false;
   return config;

@@ -46,7 +46,7 @@ bool neighbours(const ContourPoint& a, const ContourPoint& b) {
   return std::abs(along) <= kLink_m && (d - along * a.tangent).squaredNorm() <= kOffLine_m * kOffLine_m;
 }
 
-void link(const std::vector<ContourPoint>& points, Chains& chains) {
+void join_neighbours(const std::vector<ContourPoint>& points, Chains& chains) {
   std::vector<std::pair<Cell, std::uint32_t>> sorted;
   for (std::uint32_t i = 0; i < points.size(); ++i)
     if (points[i].contour < 0) sorted.push_back({cell_of(points[i].position, kLink_m), i});
@@ -75,7 +75,7 @@ void link(const std::vector<ContourPoint>& points, Chains& chains) {
 ContourSegments cut_into_segments(const ContourMap& map, double segment_m) {
   const std::vector<ContourPoint>& points = map.points;
   Chains chains(points.size());
-  link(points, chains);
+  join_neighbours(points, chains);
   struct Key {
     std::int64_t contour;
     Cell cube;

@@ -10,7 +10,7 @@ namespace {
 // A surface hides a point if it is nearer by this length plus this share of the depth.
 constexpr float kSlack_m = 0.01F;
 constexpr float kSlackShare = 0.002F;
-// ... and, in the cells around, by this share: a silhouette close by.
+// In the cells around it, a surface hides a point if it is nearer by this share: a silhouette close by.
 constexpr float kSilhouetteShare = 0.10F;
 }  // namespace
 
@@ -23,7 +23,7 @@ DepthBuffer::DepthBuffer(const Eigen::Vector2d& tangents, double cell)
   surfaces_.resize(inverse_depths_.size());
 }
 
-void DepthBuffer::start(const ContourMap& map, const Pose& T_map_cam, double near_m) {
+void DepthBuffer::reset_view(const ContourMap& map, const Pose& T_map_cam, double near_m) {
   std::fill(inverse_depths_.begin(), inverse_depths_.end(), 0.0F);
   slopes_.clear();
   const Pose T_cam_map = T_map_cam.inverse();
@@ -45,7 +45,7 @@ std::size_t DepthBuffer::draw(const ContourMap& map, std::span<const std::uint32
 }
 
 void DepthBuffer::render(const ContourMap& map, const Pose& T_map_cam, double near_m) {
-  start(map, T_map_cam, near_m);
+  reset_view(map, T_map_cam, near_m);
   std::vector<std::uint32_t> all(map.occluders.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   draw(map, all);

@@ -19,7 +19,7 @@ class DepthBuffer {
   DepthBuffer(const Eigen::Vector2d& tangents, double cell);
 
   /// Empties the grid and looks from a new place.
-  void start(const ContourMap& map, const Pose& T_map_cam, double near_m);
+  void reset_view(const ContourMap& map, const Pose& T_map_cam, double near_m);
   /// Draws triangles of that map, by number; what is nearer than `near_m` is cut off. Returns how many cells
   /// were filled.
   std::size_t draw(const ContourMap& map, std::span<const std::uint32_t> triangles);

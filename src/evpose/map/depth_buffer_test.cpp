@@ -26,8 +26,8 @@ ContourMap board() {
 
 class DepthBufferLaws : public ::testing::Test {
  protected:
-  DepthBufferLaws() : map_(board()) { look(Pose{Eigen::Quaterniond::Identity(), map_.anchor}); }
-  void look(const Pose& T_map_cam) {
+  DepthBufferLaws() : map_(board()) { render_from(Pose{Eigen::Quaterniond::Identity(), map_.anchor}); }
+  void render_from(const Pose& T_map_cam) {
     T_map_cam_ = T_map_cam;
     buffer_.render(map_, T_map_cam, 0.1);
   }
@@ -72,7 +72,7 @@ TEST_F(DepthBufferLaws, SurfacesThroughTheNearPlaneAreCutNotLost) {
 }
 
 TEST_F(DepthBufferLaws, TurnsWithTheView) {
-  look(Pose{so3::exp({0, 0.3, 0}), map_.anchor + Eigen::Vector3d(-0.5, 0.2, 0.3)});
+  render_from(Pose{so3::exp({0, 0.3, 0}), map_.anchor + Eigen::Vector3d(-0.5, 0.2, 0.3)});
   EXPECT_TRUE(hides({0.3, -0.1, 2.5}));
   EXPECT_FALSE(hides({0.0, 0.0, 1.9}));
 }

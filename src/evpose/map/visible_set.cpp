@@ -4,20 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
-#include <unordered_set>
 
 #include "evpose/core/config.h"
 
 namespace evpose {
 namespace {
 
-constexpr int kBlockCubes = 8;                 // a block is 8 x 8 x 8 cubes
-constexpr float kOccluderCubes = 4;            // triangles are gathered in boxes of 4 x 4 x 4 cubes ...
-constexpr std::uint32_t kMostOccluders = 256;  // ... and by so many
-constexpr double kInTime = 0.9;                // of the way to a refresh, the next choice shall be there
-constexpr float kLookedAt = 0.4F;              // of the stride, in the image: spacing of the points looked at
-constexpr std::size_t kCellsAPoint = 200;      // filled in the time that a point takes
+constexpr double kInTime = 0.9;            // of the way to a refresh, the next choice shall be there
+constexpr float kExamined = 0.4F;          // of the stride, in the image: spacing of the points examined
+constexpr std::size_t kCellsAPoint = 200;  // filled in the time that a point takes
 constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 constexpr double kDepthCell_px = 2;  // of the occluders' depth buffer, in an image 640 wide
 constexpr double kWidth_px = 640;
@@ -32,47 +27,6 @@ std::uint32_t priority_of(std::uint32_t point) {
   h ^= h >> 15;
   h *= 0x85EBCA77u;
   return h ^ (h >> 13);
-}
-
-/// Key of a short stretch of a contour, `length` long, a quarter of it wide, in its direction.
-std::uint64_t stretch_of(const ContourPoint& p, float length) {
-  int axis = 0;
-  p.tangent.cwiseAbs().maxCoeff(&axis);
-  const float sign = p.tangent[axis] < 0 ? -1.0F : 1.0F;
-  std::uint64_t key = static_cast<std::uint64_t>(axis);
-  const auto mix = [&key](float v) {
-    key = (key ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v)))) * 0x9E3779B97F4A7C15u;
-    key ^= key >> 29;
-  };
-  for (int k = 0; k < 3; ++k) {
-    mix(std::clamp(p.position[k] / (k == axis ? length : 0.25F * length), -1e15F, 1e15F));
-    if (k != axis) mix(4 * sign * p.tangent[k] + 0.5F);
-  }
-  return key;
-}
-
-std::int64_t key_of(const Eigen::Vector3f& p, float edge) {
-  const auto coordinate = [edge](float v) {
-    return static_cast<std::int64_t>(std::clamp(std::floor(v / edge), -1048576.0F, 1048575.0F)) & 0x1FFFFF;
-  };
-  return (coordinate(p.z()) << 42) | (coordinate(p.y()) << 21) | coordinate(p.x());
-}
-
-struct Sphere {
-  Eigen::Vector3f centre;
-  float radius;
-};
-
-template <class Position>
-Sphere bound(std::uint32_t begin, std::uint32_t end, const Position& position) {
-  Eigen::Vector3f low = position(begin), high = low;
-  for (std::uint32_t i = begin; i < end; ++i) {
-    low = low.cwiseMin(position(i));
-    high = high.cwiseMax(position(i));
-  }
-  Sphere s{0.5F * (low + high), 0};
-  for (std::uint32_t i = begin; i < end; ++i) s.radius = std::max(s.radius, (position(i) - s.centre).norm());
-  return s;
 }
 
 /// Tangents of the half angles of view, with some room for the margin; at most 75 deg.
@@ -102,128 +56,6 @@ void describe(ConfigTable& table, VisibleSetConfig& c) {
   table.add("occlusion", c.occlusion, "leave out points behind the map's occluders, if it has any");
   table.add("grazing_sin", c.grazing_sin, "", "least sine of the angle between contour and line of sight",
             {0, 1});
-}
-
-ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
-    : map_(map), cube_m_(static_cast<float>(cube_m)) {
-  const std::size_t n = map.points.size();
-  struct Keys {
-    std::int64_t block, cube;
-  };
-  std::vector<Keys> keys(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Eigen::Vector3f& p = map.points[i].position;
-    keys[i] = {key_of(p, cube_m_ * kBlockCubes), key_of(p, cube_m_)};
-  }
-  for (std::uint32_t i = 0; i < n; ++i)
-    if (!is_view_dependent(map.points[i].kind)) order_.push_back(i);
-  std::sort(order_.begin(), order_.end(), [&keys](std::uint32_t a, std::uint32_t b) {
-    if (keys[a].block != keys[b].block) return keys[a].block < keys[b].block;
-    if (keys[a].cube != keys[b].cube) return keys[a].cube < keys[b].cube;
-    return a < b;
-  });
-  const auto position = [&](std::uint32_t i) -> const Eigen::Vector3f& {
-    return map_.points[order_[i]].position;
-  };
-  const auto count = static_cast<std::uint32_t>(order_.size());
-  for (std::uint32_t begin = 0; begin < count;) {
-    std::uint32_t block_end = begin;
-    while (block_end < count && keys[order_[block_end]].block == keys[order_[begin]].block) ++block_end;
-    const Sphere whole = bound(begin, block_end, position);
-    const auto first_cube = static_cast<std::uint32_t>(cubes_.size());
-    for (std::uint32_t i = begin; i < block_end;) {
-      std::uint32_t end = i;
-      while (end < block_end && keys[order_[end]].cube == keys[order_[i]].cube) ++end;
-      const Sphere s = bound(i, end, position);
-      cubes_.push_back({s.centre, s.radius, i, end, {}});
-      sort_by_level(cubes_.back());
-      i = end;
-    }
-    blocks_.push_back({keys[order_[begin]].block, first_cube, static_cast<std::uint32_t>(cubes_.size()),
-                       whole.centre, whole.radius});
-    begin = block_end;
-  }
-  sort_occluders();
-}
-
-void ContourIndex::sort_by_level(Cube& cube) {
-  const auto at = [this](std::uint32_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-  std::uint32_t done = cube.begin;
-  float spacing = kCoarsest_m;
-  std::unordered_set<std::uint64_t> taken;
-  for (std::uint32_t& end : cube.level_end) {
-    taken.clear();
-    for (auto i = at(cube.begin); i != at(done); ++i) taken.insert(stretch_of(map_.points[*i], spacing));
-    const auto rest = std::stable_partition(at(done), at(cube.end), [&](std::uint32_t number) {
-      return taken.insert(stretch_of(map_.points[number], spacing)).second;
-    });
-    end = done = static_cast<std::uint32_t>(rest - order_.begin());
-    spacing *= 0.5F;
-  }
-}
-
-std::uint32_t ContourIndex::Cube::end_for(float spacing_m) const {
-  float spacing = kCoarsest_m;
-  for (const std::uint32_t e : level_end) {
-    if (spacing <= spacing_m) return e;
-    spacing *= 0.5F;
-  }
-  return end;
-}
-
-void ContourIndex::sort_occluders() {
-  const TriangleMesh& mesh = map_.occluders;
-  const auto n = static_cast<std::uint32_t>(mesh.triangles.size());
-  const auto corner = [&mesh](std::uint32_t triangle, std::size_t k) -> const Eigen::Vector3f& {
-    return mesh.vertices[mesh.triangles[triangle][k]];
-  };
-  std::vector<std::int64_t> keys(n);
-  for (std::uint32_t i = 0; i < n; ++i)
-    keys[i] = key_of((corner(i, 0) + corner(i, 1) + corner(i, 2)) / 3, cube_m_ * kOccluderCubes);
-  occluder_order_.resize(n);
-  std::iota(occluder_order_.begin(), occluder_order_.end(), 0u);
-  std::sort(occluder_order_.begin(), occluder_order_.end(), [&keys](std::uint32_t a, std::uint32_t b) {
-    return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
-  });
-  for (std::uint32_t begin = 0, end = 0; begin < n; begin = end) {
-    while (end < n && end - begin < kMostOccluders &&
-           keys[occluder_order_[end]] == keys[occluder_order_[begin]])
-      ++end;
-    const Sphere s = bound(3 * begin, 3 * end, [&](std::uint32_t i) -> const Eigen::Vector3f& {
-      return corner(occluder_order_[i / 3], i % 3);
-    });
-    occluders_.push_back({s.centre, s.radius, begin, end});
-  }
-}
-
-void ContourIndex::near(const Eigen::Vector3d& centre_map, double radius_m,
-                        std::vector<std::uint32_t>& out) const {
-  const Eigen::Vector3f centre = (centre_map - map_.anchor).cast<float>();
-  const auto radius = static_cast<float>(radius_m);
-  // Only the blocks whose keys lie around the sphere are looked up; few enough of them to ask for each.
-  const float edge = cube_m_ * kBlockCubes;
-  const Eigen::Vector3f low = ((centre.array() - radius) / edge).floor(),
-                        high = ((centre.array() + radius) / edge).floor();
-  const Eigen::Vector3f count = high - low + Eigen::Vector3f::Ones();
-  const auto take = [&](const BlockRange& b) {
-    if ((b.centre - centre).norm() > radius + b.radius) return;
-    for (std::uint32_t c = b.begin; c < b.end; ++c)
-      if ((cubes_[c].centre - centre).norm() <= radius + cubes_[c].radius) out.push_back(c);
-  };
-  if (count.prod() > static_cast<float>(blocks_.size())) {
-    for (const auto& b : blocks_) take(b);
-    return;
-  }
-  const std::size_t first = out.size();
-  for (float z = low.z(); z <= high.z(); ++z)
-    for (float y = low.y(); y <= high.y(); ++y)
-      for (float x = low.x(); x <= high.x(); ++x) {
-        const std::int64_t key = key_of(Eigen::Vector3f(x + 0.5F, y + 0.5F, z + 0.5F) * edge, edge);
-        const auto it = std::lower_bound(blocks_.begin(), blocks_.end(), key,
-                                         [](const BlockRange& b, std::int64_t k) { return b.key < k; });
-        if (it != blocks_.end() && it->key == key) take(*it);
-      }
-  std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end());
 }
 
 VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config,
@@ -266,31 +98,32 @@ const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
   last_ = T_map_cam;
   if (moved > config_.refresh_px) {
     // Too late to take one's time, unless what is under way is of this place.
-    if (calls_left_ == 0 || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px) begin(T_map_cam);
-    complete();
+    if (calls_left_ == 0 || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px)
+      begin_choice(T_map_cam);
+    complete_choice();
   } else if (calls_left_ > 0) {
     if (--calls_left_ == 0)
-      complete();
+      complete_choice();
     else if (!job_.valid())
-      work(remaining_ / static_cast<std::size_t>(calls_left_ + 1));
+      examine(remaining_ / static_cast<std::size_t>(calls_left_ + 1));
   } else if (moved + config_.updates * step > kInTime * config_.refresh_px) {
-    begin(T_map_cam);
-    if (background_) job_ = std::async(std::launch::async, [this] { work(kAll); });
+    begin_choice(T_map_cam);
+    if (background_) job_ = std::async(std::launch::async, [this] { examine(kAll); });
   }
   return points_;
 }
 
-void VisibleSet::begin(const Pose& T_map_cam) {
+void VisibleSet::begin_choice(const Pose& T_map_cam) {
   if (job_.valid()) job_.get();
-  start(T_map_cam);
+  list_candidates(T_map_cam);
   calls_left_ = config_.updates;
 }
 
-void VisibleSet::complete() {
+void VisibleSet::complete_choice() {
   if (job_.valid())
     job_.get();
   else
-    work(kAll);
+    examine(kAll);
   calls_left_ = 0;
   points_.swap(next_points_);
   T_map_cam_ = next_T_map_cam_;
@@ -304,7 +137,7 @@ bool VisibleSet::outside_cone(const Eigen::Vector3f& centre, float radius) const
          radius;
 }
 
-void VisibleSet::start(const Pose& T_map_cam) {
+void VisibleSet::list_candidates(const Pose& T_map_cam) {
   next_T_map_cam_ = T_map_cam;
   next_points_.clear();
   chosen_.clear();
@@ -319,7 +152,7 @@ void VisibleSet::start(const Pose& T_map_cam) {
   occluders_.clear();
   occluders_done_ = cubes_done_ = remaining_ = 0;
   if (config_.occlusion && !index_.occluders().empty()) {
-    depth_.start(map, T_map_cam, config_.near_m);
+    depth_.reset_view(map, T_map_cam, config_.near_m);
     for (std::uint32_t i = 0; i < index_.occluders().size(); ++i) {
       const auto& block = index_.occluders()[i];
       const Eigen::Vector3f centre = R_cam_map_ * block.centre + offset_;
@@ -329,24 +162,25 @@ void VisibleSet::start(const Pose& T_map_cam) {
     }
   }
   cubes_.clear();
-  index_.near(T_map_cam.p, config_.far_m, cubes_);
+  index_.append_cubes_within(T_map_cam.p, config_.far_m, cubes_);
   std::erase_if(cubes_, [&](std::uint32_t i) {
     const auto& cube = index_.cubes()[i];
     return outside_cone(R_cam_map_ * cube.centre + offset_, cube.radius);
   });
-  for (const std::uint32_t i : cubes_) remaining_ += wanted(index_.cubes()[i]) - index_.cubes()[i].begin;
+  for (const std::uint32_t i : cubes_)
+    remaining_ += end_of_examined(index_.cubes()[i]) - index_.cubes()[i].begin;
   remaining_ = std::max(remaining_, effort_);
   effort_ = 0;
 }
 
-/// Of a cube no more points are looked at than its distance asks for.
-std::uint32_t VisibleSet::wanted(const ContourIndex::Cube& cube) const {
+/// Of a cube no more points are examined than its distance asks for.
+std::uint32_t VisibleSet::end_of_examined(const ContourIndex::Cube& cube) const {
   const float distance = (R_cam_map_ * cube.centre + offset_).norm() - cube.radius;
-  return cube.end_for(kLookedAt * static_cast<float>(config_.stride_px / camera_.focal_px()) *
+  return cube.end_for(kExamined * static_cast<float>(config_.stride_px / camera_.focal_px()) *
                       std::max(distance, static_cast<float>(config_.near_m)));
 }
 
-void VisibleSet::work(std::size_t most) {
+void VisibleSet::examine(std::size_t most) {
   std::size_t done = 0;
   while (done < most && occluders_done_ < occluders_.size()) {
     const auto& block = index_.occluders()[occluders_[occluders_done_++]];
@@ -357,13 +191,13 @@ void VisibleSet::work(std::size_t most) {
   }
   while (done < most && cubes_done_ < cubes_.size()) {
     const auto& cube = index_.cubes()[cubes_[cubes_done_++]];
-    const std::uint32_t end = wanted(cube);
-    for (std::uint32_t k = cube.begin; k < end; ++k) look_at(index_.order()[k]);
+    const std::uint32_t end = end_of_examined(cube);
+    for (std::uint32_t k = cube.begin; k < end; ++k) keep_if_visible(index_.order()[k]);
     done += end - cube.begin;
   }
   remaining_ -= std::min(remaining_, done);
   effort_ += done;
-  if (occluders_done_ == occluders_.size() && cubes_done_ == cubes_.size() && !finished_) finish();
+  if (occluders_done_ == occluders_.size() && cubes_done_ == cubes_.size() && !finished_) keep_to_budget();
 }
 
 std::size_t VisibleSet::cell_of(const Eigen::Vector2f& pixel) const {
@@ -373,7 +207,7 @@ std::size_t VisibleSet::cell_of(const Eigen::Vector2f& pixel) const {
 }
 
 /// True if a chosen point of the same contour, which is at u along t, is nearer than the stride.
-bool VisibleSet::has_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const {
+bool VisibleSet::has_chosen_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const {
   const auto stride = static_cast<float>(config_.stride_px);
   const auto middle = static_cast<std::ptrdiff_t>(cell_of(u));
   for (int row = -1; row <= 1; ++row)
@@ -391,7 +225,7 @@ bool VisibleSet::has_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& 
   return false;
 }
 
-void VisibleSet::look_at(std::uint32_t number) {
+void VisibleSet::keep_if_visible(std::uint32_t number) {
   const ContourPoint& point = index_.map().points[number];
   const Eigen::Vector3f near_by = R_cam_map_ * point.position + offset_;
   const auto far_m = static_cast<float>(config_.far_m);
@@ -406,7 +240,7 @@ void VisibleSet::look_at(std::uint32_t number) {
   const Eigen::Vector2d along = jacobian * tangent;
   if (!(along.squaredNorm() > 0)) return;
   const Eigen::Vector2f u = pixel->cast<float>(), direction = along.normalized().cast<float>();
-  if (has_neighbour(u, direction)) return;
+  if (has_chosen_neighbour(u, direction)) return;
   if (tangent.cross(x).squaredNorm() < config_.grazing_sin * config_.grazing_sin * x.squaredNorm()) return;
   if (!occluders_.empty() && depth_.hides(x)) return;
   std::int32_t& head = cells_[cell_of(u)];
@@ -415,7 +249,7 @@ void VisibleSet::look_at(std::uint32_t number) {
   next_points_.push_back(number);
 }
 
-void VisibleSet::finish() {
+void VisibleSet::keep_to_budget() {
   finished_ = true;
   if (next_points_.size() > static_cast<std::size_t>(config_.budget)) {
     const auto middle = next_points_.begin() + config_.budget;

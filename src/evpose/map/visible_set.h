@@ -9,70 +9,12 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/core/pose.h"
-#include "evpose/map/contour_map.h"
+#include "evpose/map/contour_index.h"
 #include "evpose/map/depth_buffer.h"
 
 namespace evpose {
 
 class ConfigTable;
-
-/// A map's points sorted into cubes, so that a query touches only the cubes near a view: its cost does not
-/// grow with the map.
-class ContourIndex {
- public:
-  /// Keeps a reference to `map`, whose view-dependent contours are left out. `cube_m`: edge of a cube.
-  explicit ContourIndex(const ContourMap& map, double cube_m = 0.5);
-
-  /// Inside a cube the points come from coarse to fine: first some that lie 16 cm apart along the contours,
-  /// then those that make it 8 cm, and so on.
-  static constexpr int kLevels = 5;
-  static constexpr float kCoarsest_m = 0.16F;
-
-  struct Cube {
-    Eigen::Vector3f centre;    ///< of its points' bounding box, relative to the map's anchor
-    float radius;              ///< of the sphere around its points, metres
-    std::uint32_t begin, end;  ///< range of order()
-    std::uint32_t level_end[kLevels];
-
-    /// End of a range that begins at `begin` and holds points at about `spacing_m` along every contour.
-    std::uint32_t end_for(float spacing_m) const;
-  };
-  const std::vector<Cube>& cubes() const { return cubes_; }
-  /// Point numbers of the map, cube after cube.
-  const std::vector<std::uint32_t>& order() const { return order_; }
-  const ContourMap& map() const { return map_; }
-
-  /// A handful of occluding triangles that lie together.
-  struct Occluders {
-    Eigen::Vector3f centre;
-    float radius;
-    std::uint32_t begin, end;  ///< range of occluder_order()
-  };
-  const std::vector<Occluders>& occluders() const { return occluders_; }
-  const std::vector<std::uint32_t>& occluder_order() const { return occluder_order_; }
-
-  /// Numbers of the cubes that meet the sphere, ascending. Appended to `out`.
-  void near(const Eigen::Vector3d& centre_map, double radius_m, std::vector<std::uint32_t>& out) const;
-
- private:
-  using Block = std::int64_t;  ///< key of a block of 8^3 cubes
-  Block block(const Eigen::Vector3f& relative) const;
-  struct BlockRange {
-    Block key;
-    std::uint32_t begin, end;  ///< range of cubes_
-    Eigen::Vector3f centre;
-    float radius;
-  };
-  const ContourMap& map_;
-  float cube_m_;
-  std::vector<Cube> cubes_;
-  std::vector<BlockRange> blocks_;
-  std::vector<std::uint32_t> order_;
-  void sort_by_level(Cube& cube);
-  void sort_occluders();
-  std::vector<Occluders> occluders_;
-  std::vector<std::uint32_t> occluder_order_;
-};
 
 struct VisibleSetConfig {
   double far_m = 40;       ///< points further away are left out
@@ -106,16 +48,17 @@ class VisibleSet {
 
  private:
   double moved_px(const Pose& from, const Pose& to) const;
-  void begin(const Pose& T_map_cam);
-  void complete();
-  void start(const Pose& T_map_cam);
-  /// Looks at so many triangles and points, or a few more.
-  void work(std::size_t most);
-  std::uint32_t wanted(const ContourIndex::Cube& cube) const;
-  void look_at(std::uint32_t number);
-  void finish();
+  void begin_choice(const Pose& T_map_cam);
+  /// Does what is left of the choice under way, and takes it.
+  void complete_choice();
+  void list_candidates(const Pose& T_map_cam);
+  /// Draws and examines so many triangles and points, or a few more.
+  void examine(std::size_t most);
+  std::uint32_t end_of_examined(const ContourIndex::Cube& cube) const;
+  void keep_if_visible(std::uint32_t number);
+  void keep_to_budget();
   bool outside_cone(const Eigen::Vector3f& centre_cam, float radius) const;
-  bool has_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const;
+  bool has_chosen_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const;
   std::size_t cell_of(const Eigen::Vector2f& pixel) const;
 
   const ContourIndex& index_;
@@ -138,7 +81,7 @@ class VisibleSet {
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
   std::size_t effort_ = 0;  ///< that it took so far
   DepthBuffer depth_;
-  std::vector<std::uint32_t> occluders_, cubes_;  ///< in view, what is left to look at
+  std::vector<std::uint32_t> occluders_, cubes_;  ///< in view, what is left to examine
   std::size_t occluders_done_ = 0, cubes_done_ = 0, remaining_ = 0;
   std::vector<std::uint32_t> next_points_;
   /// A chosen point in the grid of `stride_px` cells that finds its neighbours along the contour.

@@ -51,7 +51,7 @@ class VisibleLaws : public ::testing::Test {
 TEST_F(VisibleLaws, IndexFindsWhatBruteForceFinds) {
   for (double radius : {0.3, 2.0, 100.0}) {
     std::vector<std::uint32_t> cubes;
-    index_.near(pose_.p, radius, cubes);
+    index_.append_cubes_within(pose_.p, radius, cubes);
     std::set<std::uint32_t> found;
     for (const std::uint32_t c : cubes)
       for (std::uint32_t k = index_.cubes()[c].begin; k < index_.cubes()[c].end; ++k)

@@ -9,27 +9,25 @@
 
 #include "evpose/core/parallel.h"
 #include "evpose/map_build/arcs.h"
+#include "evpose/map_build/beyond_edge.h"
 #include "evpose/map_build/edge_fit.h"
 #include "evpose/map_build/strips.h"
-#include "evpose/map_build/view_points.h"
 
 namespace evpose::map_build {
 namespace {
 
 constexpr double kMostDepthSigma = 0.3;  // noise: of the far edge of a narrow face
-constexpr double kLeastDepth = 1.5;      // noise: of a face whose edges are told apart ...
-constexpr double kMostDepth = 3.5;       // ... and of one too narrow for a plane of its own
+constexpr double kLeastDepth = 1.5;      // noise: of a face whose edges are told apart
+constexpr double kMostDepth = 3.5;       // noise: of a face too narrow for a plane of its own
 constexpr double kUneven = 0.1;          // noise: that many points do not average away
-constexpr double kArcPart_m = 0.02;      // straight pieces that an arc is written in
-constexpr int kFewestChunks = 3;         // of an arc, each fitted on its own ...
+constexpr double kArcPart_m = 0.02;      // straight segments that an arc is written in
+constexpr int kFewestChunks = 3;         // of an arc, each fitted on its own
 constexpr double kLeastGain = 4;         // of log likelihood, by an arc over lines
-constexpr double kMostChunkSigma = 3;    // ... to so much worse than the arc must be known
-
-double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane);
+constexpr double kMostChunkSigma = 3;    // of a chunk's place, over that of an arc
 
 /// What became of a part of an outline.
 struct Traced {
-  std::vector<Piece> pieces;
+  std::vector<LineSegment> segments;
   double left_out_m = 0;
 };
 
@@ -45,28 +43,26 @@ class BoundaryFinder {
         creases_(input.creases[number]),
         config_(config),
         fitter_(input.surface, input.tree, plane_, outline_.cell_m, config.most_blur_noise),
-        free_side_(side_of_the_rest(input.surface, plane_)) {}
+        beyond_(input.surface, input.tree, plane_, input.views) {}
 
-  std::vector<Piece> arcs(const Ring& ring) const;
-  Traced side(const Ring& ring, std::size_t number, const std::vector<Piece>& arcs) const;
+  std::vector<LineSegment> find_arcs_of(const Ring& ring) const;
+  Traced trace_side(const Ring& ring, std::size_t number, const std::vector<LineSegment>& arcs) const;
 
  private:
   const PlaneFrame& frame() const { return fitter_.frame(); }
   double sigma_m(const FittedEdge& fitted, const Eigen::Vector3d& at) const;
   double least_side_m() const { return std::max(config_.least_length_m, 3 * outline_.cell_m); }
-  bool explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std::vector<Piece>& pieces) const;
-  std::pair<Eigen::Vector2d, Eigen::Vector2d> without(const std::vector<Piece>& arcs,
-                                                      const Eigen::Vector2d& a,
-                                                      const Eigen::Vector2d& b) const;
-  bool goes_on(const Piece& piece) const;
-  bool covered(const Piece& piece) const;
-  bool hidden(const Piece& piece) const;
-  bool is_edge(const FittedEdge& fitted, const Piece& piece) const;
-  std::optional<Piece> far_edge(const Piece& near, const SectionFit& section) const;
-  std::vector<Piece> pieces_along(const FittedEdge& fitted) const;
+  bool runs_along(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                  const std::vector<LineSegment>& segments) const;
+  std::pair<Eigen::Vector2d, Eigen::Vector2d> longest_part_without(const std::vector<LineSegment>& arcs,
+                                                                   const Eigen::Vector2d& a,
+                                                                   const Eigen::Vector2d& b) const;
+  bool is_edge(const FittedEdge& fitted, const LineSegment& segment) const;
+  std::optional<LineSegment> far_edge(const LineSegment& near, const EdgeProfileFit& profile) const;
+  std::vector<LineSegment> segments_along(const FittedEdge& fitted) const;
   double chunk_m() const { return std::max(config_.least_length_m, 2.5 * outline_.cell_m); }
-  std::vector<FittedEdge> chunks_of(const Circle& circle, double from_rad, double to_rad, int chunks) const;
-  std::vector<Piece> arc(const Ring& ring, const ArcStretch& stretch) const;
+  std::vector<FittedEdge> fit_chunks(const Circle& circle, double from_rad, double to_rad, int chunks) const;
+  std::vector<LineSegment> fit_arc(const Ring& ring, const ArcStretch& stretch) const;
 
   const SurfacePoints& surface_;
   const Neighbours& tree_;
@@ -74,22 +70,22 @@ class BoundaryFinder {
   const FittedPlane& plane_;
   std::int32_t number_;
   const Outline& outline_;
-  const std::vector<Piece>& creases_;
+  const std::vector<LineSegment>& creases_;
   const BoundaryConfig& config_;
   EdgeFitter fitter_;
-  double free_side_;
+  BeyondEdge beyond_;
 };
 
-/// Half or more of the side lies along pieces that were found.
-bool BoundaryFinder::explained(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-                               const std::vector<Piece>& pieces) const {
+/// Half or more of the side lies along segments that were found.
+bool BoundaryFinder::runs_along(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                                const std::vector<LineSegment>& segments) const {
   const double reach = 1.5 * outline_.cell_m + 2 * surface_.scale.noise_m;
   constexpr int kProbes = 8;
   int near = 0;
   for (int k = 0; k < kProbes; ++k) {
     const Eigen::Vector3d x = frame().lift(a + (b - a) * ((k + 0.5) / kProbes));
-    near += std::any_of(pieces.begin(), pieces.end(),
-                        [&](const Piece& piece) { return distance(piece, x) < reach; })
+    near += std::any_of(segments.begin(), segments.end(),
+                        [&](const LineSegment& segment) { return distance(segment, x) < reach; })
                 ? 1
                 : 0;
   }
@@ -97,15 +93,14 @@ bool BoundaryFinder::explained(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 }
 
 /// The longest part of a side that no arc runs along.
-std::pair<Eigen::Vector2d, Eigen::Vector2d> BoundaryFinder::without(const std::vector<Piece>& arcs,
-                                                                    const Eigen::Vector2d& a,
-                                                                    const Eigen::Vector2d& b) const {
+std::pair<Eigen::Vector2d, Eigen::Vector2d> BoundaryFinder::longest_part_without(
+    const std::vector<LineSegment>& arcs, const Eigen::Vector2d& a, const Eigen::Vector2d& b) const {
   if (arcs.empty()) return {a, b};
   constexpr int kParts = 32;
   int first = 0, count = 0;
   for (int begin = 0; begin < kParts;) {
     int end = begin;
-    while (end < kParts && !explained(a + (b - a) * end / kParts, a + (b - a) * (end + 1) / kParts, arcs))
+    while (end < kParts && !runs_along(a + (b - a) * end / kParts, a + (b - a) * (end + 1) / kParts, arcs))
       ++end;
     if (end - begin > count) first = begin, count = end - begin;
     begin = end + 1;
@@ -113,89 +108,18 @@ std::pair<Eigen::Vector2d, Eigen::Vector2d> BoundaryFinder::without(const std::v
   return {a + (b - a) * first / kParts, a + (b - a) * (first + count) / kParts};
 }
 
-/// Points in the plane beyond the edge: it is none, only a change of density or of the plane's number.
-bool BoundaryFinder::goes_on(const Piece& piece) const {
-  constexpr int kProbes = 12;
-  int hit = 0;
-  std::uint32_t index = 0;
-  float square = 0;
-  const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
-  for (int k = 0; k < kProbes; ++k) {
-    const Eigen::Vector3d x =
-        piece.begin + (piece.end - piece.begin) * ((k + 0.5) / kProbes) + 1.6 * reach * piece.normal_a;
-    if (tree_.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
-        std::sqrt(static_cast<double>(square)) < reach)
-      ++hit;
-  }
-  return hit > kProbes / 2;
-}
-
-/// Something stands before the plane beyond the edge, on the side that the plane was seen from: the surface
-/// is not over there, it is merely hidden. Only told of planes that have nearly everything on one side, like
-/// walls.
-bool BoundaryFinder::covered(const Piece& piece) const {
-  if (free_side_ == 0) return false;
-  constexpr int kProbes = 8, kHeights = 6;
-  constexpr double kHighest_m = 0.45;
-  int hit = 0;
-  std::uint32_t index = 0;
-  float square = 0;
-  const double reach = std::max(2 * plane_.spacing_m, 0.04), lowest = 2 * reach;
-  for (int k = 0; k < kProbes; ++k) {
-    const Eigen::Vector3d beyond =
-        piece.begin + (piece.end - piece.begin) * ((k + 0.5) / kProbes) + 1.5 * reach * piece.normal_a;
-    for (int h = 0; h < kHeights; ++h) {
-      const Eigen::Vector3d x =
-          beyond + free_side_ * (lowest + (kHighest_m - lowest) * h / (kHeights - 1)) * plane_.normal;
-      if (tree_.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
-          std::sqrt(static_cast<double>(square)) < reach) {
-        ++hit;
-        break;
-      }
-    }
-  }
-  return hit > kProbes / 2;
-}
-
-/// Nobody could see whether the surface goes on beyond the edge: something stands before it.
-bool BoundaryFinder::hidden(const Piece& piece) const {
-  constexpr int kProbes = 8;
-  const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
-  const double margin = std::max({0.05, 3 * plane_.spacing_m, 5 * surface_.scale.noise_m});
-  int hit = 0;
-  for (int k = 0; k < kProbes; ++k) {
-    const Eigen::Vector3d x =
-        piece.begin + (piece.end - piece.begin) * ((k + 0.5) / kProbes) + 1.6 * reach * piece.normal_a;
-    hit += hidden_from_all(views_, x, plane_, margin) ? 1 : 0;
-  }
-  return hit > kProbes / 2;
-}
-
-/// Side of the plane that nearly all other points of the cloud lie on; 0 if there is none.
-double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) {
-  constexpr double kAway_m = 0.1, kNearlyAll = 0.9;
-  double above = 0, below = 0;
-  const std::size_t step = std::max<std::size_t>(1, surface.size() / 4000);
-  for (std::size_t i = 0; i < surface.size(); i += step) {
-    const double d = plane.distance(surface.position[i].cast<double>());
-    above += d > kAway_m ? 1 : 0;
-    below += d < -kAway_m ? 1 : 0;
-  }
-  if (above > kNearlyAll * (above + below)) return 1;
-  return below > kNearlyAll * (above + below) ? -1 : 0;
-}
-
 /// Of a second face too narrow for a plane of its own.
-std::optional<Piece> BoundaryFinder::far_edge(const Piece& near, const SectionFit& section) const {
+std::optional<LineSegment> BoundaryFinder::far_edge(const LineSegment& near,
+                                                    const EdgeProfileFit& profile) const {
   const double noise = surface_.scale.noise_m;
-  if (section.side == 0 || !section.ends || section.sigma_depth > kMostDepthSigma * noise) return {};
-  if (section.depth < kLeastDepth * noise || section.depth > kMostDepth * noise) return {};
-  Piece far = near;
-  far.begin += section.side * section.depth * plane_.normal;
-  far.end += section.side * section.depth * plane_.normal;
-  far.normal_b = section.side * plane_.normal;
-  if (section.beyond > section.under) far.normal_a = -near.normal_a;
-  far.sigma_m = std::sqrt(near.sigma_m * near.sigma_m + section.sigma_depth * section.sigma_depth / 2);
+  if (profile.side == 0 || !profile.ends || profile.sigma_depth > kMostDepthSigma * noise) return {};
+  if (profile.depth < kLeastDepth * noise || profile.depth > kMostDepth * noise) return {};
+  LineSegment far = near;
+  far.begin += profile.side * profile.depth * plane_.normal;
+  far.end += profile.side * profile.depth * plane_.normal;
+  far.normal_b = profile.side * plane_.normal;
+  if (profile.beyond > profile.under) far.normal_a = -near.normal_a;
+  far.sigma_m = std::sqrt(near.sigma_m * near.sigma_m + profile.sigma_depth * profile.sigma_depth / 2);
   return far;
 }
 
@@ -205,63 +129,64 @@ double BoundaryFinder::sigma_m(const FittedEdge& fitted, const Eigen::Vector3d& 
   return std::sqrt((fitted.across_m * fitted.across_m + fitted.moved_m * fitted.moved_m + off * off) / 2);
 }
 
-/// A straight edge is one piece; an arc many, each touching it in its middle.
-std::vector<Piece> BoundaryFinder::pieces_along(const FittedEdge& fitted) const {
+/// A straight edge is one segment; an arc many, each touching it in its middle.
+std::vector<LineSegment> BoundaryFinder::segments_along(const FittedEdge& fitted) const {
   const Edge& edge = fitted.edge;
-  const int side = fitted.section.side;
+  const int side = fitted.profile.side;
   const int parts =
       edge.bend == 0 ? 1 : std::max(1, static_cast<int>(std::ceil(2 * edge.half_length / kArcPart_m)));
-  std::vector<Piece> out;
+  std::vector<LineSegment> out;
   for (int k = 0; k < parts; ++k) {
     const double t = edge.half_length * ((2 * k + 1.0) / parts - 1);
     const Eigen::Vector2d along = edge.along_at(t);
     const Eigen::Vector2d across(along.y(), -along.x()), half = edge.half_length / parts * along;
     const auto lifted = [&](const Eigen::Vector2d& p) -> Eigen::Vector3d {
-      return frame().lift(p) + (side != 0 ? fitted.section.height : 0) * plane_.normal;
+      return frame().lift(p) + (side != 0 ? fitted.profile.height : 0) * plane_.normal;
     };
-    Piece piece;
-    piece.plane_a = number_;
-    piece.kind = side != 0 ? ContourKind::crease : ContourKind::boundary;
-    piece.begin = lifted(edge.at(t) - half);
-    piece.end = lifted(edge.at(t) + half);
-    piece.normal_a = across.x() * frame().first + across.y() * frame().second;
-    if (side != 0) piece.normal_b = -side * plane_.normal;
-    piece.sigma_m = sigma_m(fitted, 0.5 * (piece.begin + piece.end));
-    out.push_back(piece);
+    LineSegment segment;
+    segment.plane_a = number_;
+    segment.kind = side != 0 ? ContourKind::crease : ContourKind::boundary;
+    segment.begin = lifted(edge.at(t) - half);
+    segment.end = lifted(edge.at(t) + half);
+    segment.normal_a = across.x() * frame().first + across.y() * frame().second;
+    if (side != 0) segment.normal_b = -side * plane_.normal;
+    segment.sigma_m = sigma_m(fitted, 0.5 * (segment.begin + segment.end));
+    out.push_back(segment);
   }
   return out;
 }
 
-/// `piece`: where it would be, straight.
-bool BoundaryFinder::is_edge(const FittedEdge& fitted, const Piece& piece) const {
-  if (fitted.verdict != FittedEdge::Verdict::sharp || goes_on(piece)) return false;
-  const double reach = std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m);
-  return fitted.section.side == 0 || !stands_before(tree_, piece, reach, reach);
+/// `segment`: where it would be, straight.
+bool BoundaryFinder::is_edge(const FittedEdge& fitted, const LineSegment& segment) const {
+  if (fitted.verdict != FittedEdge::Verdict::sharp || beyond_.surface_continues(segment)) return false;
+  const double reach = beyond_.reach_m();
+  return fitted.profile.side == 0 || !stands_before(tree_, segment, reach, reach);
 }
 
-Traced BoundaryFinder::side(const Ring& ring, std::size_t number, const std::vector<Piece>& arcs) const {
+Traced BoundaryFinder::trace_side(const Ring& ring, std::size_t number,
+                                  const std::vector<LineSegment>& arcs) const {
   const Eigen::Vector2d &from = ring.coarse[number], &to = ring.coarse[(number + 1) % ring.coarse.size()];
-  if (explained(from, to, creases_)) return {};
-  const auto [a, b] = without(arcs, from, to);
+  if (runs_along(from, to, creases_)) return {};
+  const auto [a, b] = longest_part_without(arcs, from, to);
   Traced left_out{{}, (b - a).norm()};
   if (left_out.left_out_m < least_side_m()) return left_out;
-  const auto shadow = [&](Piece piece) {
-    piece.kind = ContourKind::shadow;
-    piece.sigma_m = outline_.cell_m;
-    piece.normal_b.setZero();
-    return Traced{{piece}, 0};
+  const auto shadow = [&](LineSegment segment) {
+    segment.kind = ContourKind::shadow;
+    segment.sigma_m = outline_.cell_m;
+    segment.normal_b.setZero();
+    return Traced{{segment}, 0};
   };
   FittedEdge fitted;
   fitted.edge = Edge::between(a, b);
-  const Piece as_traced = pieces_along(fitted).front();
-  if (hidden(as_traced)) return shadow(as_traced);
+  const LineSegment as_traced = segments_along(fitted).front();
+  if (beyond_.hidden_from_views(as_traced)) return shadow(as_traced);
   fitted = fitter_.fit(fitted.edge);
   if (fitted.verdict == FittedEdge::Verdict::soft) return shadow(as_traced);
-  const Piece piece = pieces_along(fitted).front();
-  if (fitted.across_m > config_.most_sigma_m || !is_edge(fitted, piece)) return left_out;
-  if (views_.empty() && covered(piece)) return shadow(piece);
-  Traced out{{piece}, 0};
-  if (const auto far = far_edge(piece, fitted.section)) out.pieces.push_back(*far);
+  const LineSegment segment = segments_along(fitted).front();
+  if (fitted.across_m > config_.most_sigma_m || !is_edge(fitted, segment)) return left_out;
+  if (views_.empty() && beyond_.something_stands_before(segment)) return shadow(segment);
+  Traced out{{segment}, 0};
+  if (const auto far = far_edge(segment, fitted.profile)) out.segments.push_back(*far);
   return out;
 }
 
@@ -295,8 +220,8 @@ int nearest_side(const std::vector<Eigen::Vector2d>& corners, const Eigen::Vecto
 }
 
 /// Fits the chunks of an arc one by one; those that are edges.
-std::vector<FittedEdge> BoundaryFinder::chunks_of(const Circle& circle, double from_rad, double to_rad,
-                                                  int chunks) const {
+std::vector<FittedEdge> BoundaryFinder::fit_chunks(const Circle& circle, double from_rad, double to_rad,
+                                                   int chunks) const {
   std::vector<FittedEdge> out;
   const double step = (to_rad - from_rad) / chunks, inside = step > 0 ? 1 : -1;
   for (int k = 0; k < chunks; ++k) {
@@ -304,23 +229,24 @@ std::vector<FittedEdge> BoundaryFinder::chunks_of(const Circle& circle, double f
         fitter_.fit(arc_edge(circle, from_rad + k * step, from_rad + (k + 1) * step, inside));
     FittedEdge straight = chunk;
     straight.edge.bend = 0;
-    const Piece piece = pieces_along(straight).front();
-    if (chunk.across_m > kMostChunkSigma * config_.most_sigma_m || !is_edge(chunk, piece)) continue;
-    if (views_.empty() ? covered(piece) : hidden(piece)) continue;
+    const LineSegment segment = segments_along(straight).front();
+    if (chunk.across_m > kMostChunkSigma * config_.most_sigma_m || !is_edge(chunk, segment)) continue;
+    if (views_.empty() ? beyond_.something_stands_before(segment) : beyond_.hidden_from_views(segment))
+      continue;
     out.push_back(chunk);
   }
   return out;
 }
 
 /// The part of a stretch that an arc explains better than the straight sides of the ring.
-std::vector<Piece> BoundaryFinder::arc(const Ring& ring, const ArcStretch& stretch) const {
+std::vector<LineSegment> BoundaryFinder::fit_arc(const Ring& ring, const ArcStretch& stretch) const {
   const double first = angle_near(stretch.circle, ring.steps[stretch.first], 0);
   double last = first;
   for (std::size_t k = 1; k < stretch.count; ++k)
     last = angle_near(stretch.circle, ring.steps[(stretch.first + k) % ring.steps.size()], last);
   const int chunks = static_cast<int>(std::abs(last - first) * stretch.circle.radius_m / chunk_m());
   if (chunks < kFewestChunks) return {};
-  const std::vector<FittedEdge> fitted = chunks_of(stretch.circle, first, last, chunks);
+  const std::vector<FittedEdge> fitted = fit_chunks(stretch.circle, first, last, chunks);
   if (2 * static_cast<int>(fitted.size()) < std::max(2 * kFewestChunks, chunks)) return {};
   // Each chunk tells two places of the curve; the nearest straight side is the line they would be on.
   std::vector<CurvePlace> places;
@@ -344,24 +270,24 @@ std::vector<Piece> BoundaryFinder::arc(const Ring& ring, const ArcStretch& stret
   const FittedEdge whole =
       fitter_.fit(arc_edge(run->circle, from - inside * half, to + inside * half, inside));
   if (whole.verdict != FittedEdge::Verdict::sharp || whole.across_m > config_.most_sigma_m) return {};
-  std::vector<Piece> out = pieces_along(whole);
-  std::erase_if(out, [&](const Piece& piece) {
-    const Eigen::Vector2d at = frame().flat(0.5 * (piece.begin + piece.end));
+  std::vector<LineSegment> out = segments_along(whole);
+  std::erase_if(out, [&](const LineSegment& segment) {
+    const Eigen::Vector2d at = frame().flat(0.5 * (segment.begin + segment.end));
     // Where its chunk was no edge, the arc has a gap.
     const bool is_edge = std::any_of(of_run.begin(), of_run.end(), [&](const FittedEdge& chunk) {
       return std::abs(chunk.edge.local(at).x()) <= chunk.edge.half_length;
     });
-    return !is_edge || explained(frame().flat(piece.begin), frame().flat(piece.end), creases_);
+    return !is_edge || runs_along(frame().flat(segment.begin), frame().flat(segment.end), creases_);
   });
   return out;
 }
 
-std::vector<Piece> BoundaryFinder::arcs(const Ring& ring) const {
-  std::vector<Piece> out;
+std::vector<LineSegment> BoundaryFinder::find_arcs_of(const Ring& ring) const {
+  std::vector<LineSegment> out;
   for (const ArcStretch& stretch : find_arcs(ring.steps, outline_.cell_m, kFewestChunks * chunk_m()))
-    for (Piece& piece : arc(ring, stretch)) {
-      piece.chain = static_cast<std::int32_t>(stretch.first);
-      out.push_back(piece);
+    for (LineSegment& segment : fit_arc(ring, stretch)) {
+      segment.chain = static_cast<std::int32_t>(stretch.first);
+      out.push_back(segment);
     }
   return out;
 }
@@ -381,7 +307,7 @@ std::vector<Boundaries> find_boundaries(const BoundaryInput& input, const Bounda
     std::size_t plane, ring, side;
   };
   std::vector<Task> rings, sides;
-  std::vector<std::vector<std::vector<Piece>>> arcs(planes);
+  std::vector<std::vector<std::vector<LineSegment>>> arcs(planes);
   for (std::size_t p = 0; p < planes; ++p) {
     if (!finders[p]) continue;
     arcs[p].resize(input.outlines[p].rings.size());
@@ -392,29 +318,29 @@ std::vector<Boundaries> find_boundaries(const BoundaryInput& input, const Bounda
   }
   pool.for_chunks(rings.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
     const auto& [p, r, s] = rings[k];
-    arcs[p][r] = finders[p]->arcs(input.outlines[p].rings[r]);
+    arcs[p][r] = finders[p]->find_arcs_of(input.outlines[p].rings[r]);
   });
   std::vector<Traced> traced(sides.size());
   pool.for_chunks(sides.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const auto& [p, r, s] = sides[k];
-      traced[k] = finders[p]->side(input.outlines[p].rings[r], s, arcs[p][r]);
+      traced[k] = finders[p]->trace_side(input.outlines[p].rings[r], s, arcs[p][r]);
     }
   });
   std::vector<Boundaries> out(planes);
   std::int32_t chains = 0;
   for (const auto& [p, r, s] : rings) {
     std::int32_t in_ring = -1;
-    for (Piece piece : arcs[p][r]) {
-      chains += piece.chain != in_ring ? 1 : 0;
-      in_ring = piece.chain;
-      piece.chain = chains;
-      out[p].pieces.push_back(piece);
+    for (LineSegment segment : arcs[p][r]) {
+      chains += segment.chain != in_ring ? 1 : 0;
+      in_ring = segment.chain;
+      segment.chain = chains;
+      out[p].segments.push_back(segment);
     }
   }
   for (std::size_t k = 0; k < sides.size(); ++k) {
     Boundaries& of = out[sides[k].plane];
-    of.pieces.insert(of.pieces.end(), traced[k].pieces.begin(), traced[k].pieces.end());
+    of.segments.insert(of.segments.end(), traced[k].segments.begin(), traced[k].segments.end());
     of.left_out_m += traced[k].left_out_m;
   }
   return out;

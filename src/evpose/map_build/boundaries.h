@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "evpose/map_build/line_segment.h"
 #include "evpose/map_build/neighbours.h"
 #include "evpose/map_build/outlines.h"
-#include "evpose/map_build/piece.h"
 
 namespace evpose {
 class ThreadPool;
@@ -18,8 +18,8 @@ namespace evpose::map_build {
 class View;
 
 struct BoundaryConfig {
-  double least_length_m = 0.12;  ///< of a piece
-  double most_sigma_m = 0.006;   ///< of a piece's place
+  double least_length_m = 0.12;  ///< of a segment
+  double most_sigma_m = 0.006;   ///< of a segment's place
   double most_blur_noise = 2;    ///< a real edge is no softer than so many times the noise; a shadow's is
 };
 
@@ -28,18 +28,18 @@ struct BoundaryInput {
   const SurfacePoints& surface;
   const Neighbours& tree;  ///< finds the cloud's points
   const Planes& planes;
-  const std::vector<bool>& unfit;                  ///< planes that have no contours
-  const std::vector<Outline>& outlines;            ///< of the planes
-  const std::vector<std::vector<Piece>>& creases;  ///< of the planes
-  std::span<const View> views;                     ///< where the cloud was seen from, if that is known
+  const std::vector<bool>& unfit;                        ///< planes that have no contours
+  const std::vector<Outline>& outlines;                  ///< of the planes
+  const std::vector<std::vector<LineSegment>>& creases;  ///< of the planes
+  std::span<const View> views;                           ///< where the cloud was seen from, if that is known
 };
 
 struct Boundaries {
-  std::vector<Piece> pieces;  ///< edges, arcs in chains of short pieces, and shadows
-  double left_out_m = 0;      ///< length of outlines left out: short, or unsure
+  std::vector<LineSegment> segments;  ///< edges, arcs in chains of short segments, and shadows
+  double left_out_m = 0;              ///< length of outlines left out: short, or unsure
 };
 
-/// For each plane the pieces of its outline that no crease explains and that end like an edge, or that are
+/// For each plane the segments of its outline that no crease explains and that end like an edge, or that are
 /// shadows: soft, or with something standing before what is beyond them.
 std::vector<Boundaries> find_boundaries(const BoundaryInput& input, const BoundaryConfig& config,
                                         ThreadPool& pool);

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "evpose/map_build/piece.h"
+#include "evpose/map_build/line_segment.h"
 #include "evpose/map_build/surface_points.h"
 
 namespace evpose::map_build {
@@ -13,7 +13,7 @@ class Neighbours;
 
 /// Step of brightness from a crease's face a to its face b: +1 brighter, -1 darker, 0 not told: no second
 /// face, too few points, or a step within the scatter. `brightness`: of each surface point.
-std::int8_t contrast_of(const Piece& piece, const SurfacePoints& surface, const Neighbours& tree,
+std::int8_t contrast_of(const LineSegment& segment, const SurfacePoints& surface, const Neighbours& tree,
                         std::span<const std::uint8_t> brightness);
 
 }  // namespace evpose::map_build

@@ -1,72 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/map_build/creases.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <tuple>
 
 #include "evpose/core/parallel.h"
+#include "evpose/map_build/edge_profile_fit.h"
+#include "evpose/map_build/median.h"
 #include "evpose/map_build/neighbours.h"
-#include "evpose/map_build/section_fit.h"
+#include "evpose/map_build/plane_contacts.h"
 #include "evpose/map_build/strips.h"
 
 namespace evpose::map_build {
 namespace {
 
-constexpr double kBinSpacings = 2.5;    // length and depth of a bin of support, in point spacings
-constexpr double kCovered = 0.35;       // least share of a bin that its points stand for
-constexpr double kAmbiguous = 1.5;      // noise: so near to the line a point may be of either plane
-constexpr double kFacetSin = 0.87;      // of the angle between facets of a column, pipe or vault, at most
-constexpr double kFacetWidth_m = 0.25;  // of such facets, at most
-constexpr int kLargestGap = 2;          // bins without support that a piece bridges
-
-using PlanePair = std::pair<std::int32_t, std::int32_t>;
-
-/// Pairs of planes with points beside each other, and the middle of those points.
-struct Contact {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  int count = 0;
-};
-
-std::map<PlanePair, Contact> find_contacts(const SurfacePoints& surface, const Planes& planes) {
-  std::map<PlanePair, Contact> contacts;
-  for (std::size_t i = 0; i < surface.size(); ++i) {
-    const std::int32_t own = planes.label[i];
-    if (own < 0) continue;
-    for (int k = 0; k < SurfacePoints::kLinks; ++k) {
-      const std::int32_t other =
-          planes.label[surface.links[i * SurfacePoints::kLinks + static_cast<std::size_t>(k)]];
-      if (other < 0 || other == own) continue;
-      Contact& contact = contacts[std::minmax(own, other)];
-      contact.sum += surface.position[i].cast<double>();
-      ++contact.count;
-    }
-  }
-  return contacts;
-}
-
-/// A line in two planes, with what lies beside it.
-struct Line {
-  Eigen::Vector3d origin, direction;
-  double at(const Eigen::Vector3d& x) const { return direction.dot(x - origin); }
-};
-
-Line intersection(const FittedPlane& a, const FittedPlane& b, const Eigen::Vector3d& near) {
-  Line line;
-  line.direction = a.normal.cross(b.normal).normalized();
-  // The point of both planes nearest to `near`.
-  Eigen::Matrix3d rows;
-  rows << a.normal.transpose(), b.normal.transpose(), line.direction.transpose();
-  const Eigen::Vector3d right(-a.d, -b.d, line.direction.dot(near));
-  line.origin = rows.partialPivLu().solve(right);
-  return line;
-}
+constexpr double kBinSpacings = 2.5;      // length and depth of a bin of support, in point spacings
+constexpr double kCovered = 0.35;         // least share of a bin that its points stand for
+constexpr double kAmbiguous = 1.5;        // noise: so near to the line a point may be of either plane
+constexpr double kFacetSin = 0.87;        // of the angle between facets of a column, pipe or vault, at most
+constexpr std::size_t kFewestPoints = 8;  // near the line
+constexpr int kLargestGap = 2;            // bins without support that a segment bridges
 
 /// Area that a plane's points stand for, in bins along a line, on one side of it.
 struct Support {
@@ -113,16 +72,18 @@ Support support_of(const NearLine& near, double bin_m, double gap_m) {
   return out;
 }
 
-/// Extent of a plane's points across a line, if they were spread evenly.
-double width_across(const SurfacePoints& surface, const FittedPlane& plane, const Line& line) {
-  const Eigen::Vector3d across = line.direction.cross(plane.normal);
-  double sum = 0;
-  for (const std::uint32_t i : plane.points) {
-    const double d = across.dot(surface.position[i].cast<double>() - plane.centre);
-    sum += d * d;
-  }
-  return std::sqrt(12 * sum / static_cast<double>(plane.points.size()));
-}
+/// The line in which two planes meet, and where their points lie beside it.
+struct Meeting {
+  PlanePair pair;
+  const FittedPlane& a;
+  const FittedPlane& b;
+  Line line;
+  double sine = 0;       ///< of the angle between the planes
+  double gap_m = 0;      ///< nearer to the line a point may be of either plane
+  double spacing_m = 0;  ///< median, of the points near the line
+  double bin_m = 0;
+  Support in_a = {}, in_b = {};
+};
 
 class CreaseFinder {
  public:
@@ -130,13 +91,21 @@ class CreaseFinder {
                const CreaseConfig& config)
       : surface_(surface), tree_(tree), planes_(planes), config_(config) {}
 
-  std::vector<Piece> pieces_of(const PlanePair& pair, const Contact& contact,
-                               const std::vector<std::int32_t>& thirds) const;
+  std::vector<LineSegment> segments_of(const PlanePair& pair, const Contact& contact,
+                                       const std::vector<std::int32_t>& thirds) const;
 
  private:
-  bool contradicted(const Piece& piece) const;
-  double snapped(const Line& line, double t, double reach_m, const PlanePair& pair,
-                 const std::vector<std::int32_t>& thirds) const;
+  /// A part of the line, with the directions out of both surfaces.
+  struct Stretch {
+    double t0, t1;
+    Eigen::Vector3d out_a, out_b;
+  };
+  std::optional<Meeting> meeting_of(const PlanePair& pair, const Contact& contact) const;
+  std::vector<Stretch> stretches_of(const Meeting& m, const std::vector<std::int32_t>& thirds) const;
+  LineSegment fit_segment(const Meeting& m, const Stretch& stretch) const;
+  bool contradicted_by_profile(const LineSegment& segment) const;
+  double snapped_to_third_plane(const Line& line, double t, double reach_m, const PlanePair& pair,
+                                const std::vector<std::int32_t>& thirds) const;
 
   const SurfacePoints& surface_;
   const Neighbours& tree_;
@@ -144,8 +113,8 @@ class CreaseFinder {
   const CreaseConfig& config_;
 };
 
-double CreaseFinder::snapped(const Line& line, double t, double reach_m, const PlanePair& pair,
-                             const std::vector<std::int32_t>& thirds) const {
+double CreaseFinder::snapped_to_third_plane(const Line& line, double t, double reach_m, const PlanePair& pair,
+                                            const std::vector<std::int32_t>& thirds) const {
   double best = t, nearest = reach_m;
   for (const std::int32_t number : thirds) {
     if (number == pair.first || number == pair.second) continue;
@@ -159,7 +128,8 @@ double CreaseFinder::snapped(const Line& line, double t, double reach_m, const P
 }
 
 /// The plane has as many points far beyond the edge as far before it: another face merely stands on it.
-bool goes_on(const std::vector<Eigen::Vector3d>& points, const SectionWindow& window, double height_m) {
+bool plane_continues(const std::vector<Eigen::Vector3d>& points, const EdgeProfileWindow& window,
+                     double height_m) {
   constexpr double kFar = 0.6, kAsMany = 0.4;
   double beyond = 0, before = 0;
   for (const auto& p : points) {
@@ -170,117 +140,142 @@ bool goes_on(const std::vector<Eigen::Vector3d>& points, const SectionWindow& wi
   return beyond > kAsMany * before;
 }
 
-/// The section across it, explained by faces at right angles, has its edge elsewhere: before books the fronts
+/// The profile across it, explained by faces at right angles, has its edge elsewhere: before books the fronts
 /// of their boards go on.
-bool CreaseFinder::contradicted(const Piece& piece) const {
+bool CreaseFinder::contradicted_by_profile(const LineSegment& segment) const {
   constexpr double kRightAngle = 0.94, kLeastGain = 10, kMostSigmas = 3, kMostNoise = 0.5, kInPlane = 2.5;
   const double noise = surface_.scale.noise_m;
-  if (piece.normal_a.cross(piece.normal_b).norm() < kRightAngle) return false;
-  const Eigen::Vector3d along = piece.tangent(), middle = 0.5 * (piece.begin + piece.end);
-  for (const auto& [number, out, other] : {std::tuple(piece.plane_a, piece.normal_a, piece.normal_b),
-                                           std::tuple(piece.plane_b, piece.normal_b, piece.normal_a)}) {
+  if (segment.normal_a.cross(segment.normal_b).norm() < kRightAngle) return false;
+  const Eigen::Vector3d along = segment.tangent(), middle = 0.5 * (segment.begin + segment.end);
+  for (const auto& [number, out, other] : {std::tuple(segment.plane_a, segment.normal_a, segment.normal_b),
+                                           std::tuple(segment.plane_b, segment.normal_b, segment.normal_a)}) {
     const FittedPlane& plane = planes_.planes[static_cast<std::size_t>(number)];
-    const SectionWindow window = section_window(0.5 * piece.length_m(), noise, plane.rms_m, plane.spacing_m);
-    std::vector<Eigen::Vector3d> points = points_around(surface_, tree_, piece.begin, piece.end,
+    const EdgeProfileWindow window =
+        edge_profile_window(0.5 * segment.length_m(), noise, plane.rms_m, plane.spacing_m);
+    std::vector<Eigen::Vector3d> points = points_around(surface_, tree_, segment.begin, segment.end,
                                                         std::hypot(window.half_width, window.half_height));
     const Eigen::Vector3d over = along.cross(out);
     for (Eigen::Vector3d& p : points) p = {along.dot(p - middle), out.dot(p - middle), over.dot(p - middle)};
-    if (goes_on(points, window, kInPlane * plane.rms_m)) continue;
-    const SectionFit section = fit_section(points, window);
+    if (plane_continues(points, window, kInPlane * plane.rms_m)) continue;
+    const EdgeProfileFit profile = fit_edge_profile(points, window);
     const int side = over.dot(other) > 0 ? -1 : 1;  // the other face goes from the edge against `other`
-    if (section.side != side || section.gain < kLeastGain) continue;
-    if (std::abs(section.place) > kMostNoise * noise + kMostSigmas * section.sigma_place) return true;
+    if (profile.side != side || profile.gain < kLeastGain) continue;
+    if (std::abs(profile.place) > kMostNoise * noise + kMostSigmas * profile.sigma_place) return true;
   }
   return false;
 }
 
-std::vector<Piece> CreaseFinder::pieces_of(const PlanePair& pair, const Contact& contact,
-                                           const std::vector<std::int32_t>& thirds) const {
+std::optional<Meeting> CreaseFinder::meeting_of(const PlanePair& pair, const Contact& contact) const {
   const FittedPlane& a = planes_.planes[static_cast<std::size_t>(pair.first)];
   const FittedPlane& b = planes_.planes[static_cast<std::size_t>(pair.second)];
-  const double sine = a.normal.cross(b.normal).norm();
-  const Line line = intersection(a, b, contact.sum / contact.count);
+  Meeting out{pair, a, b, intersection(a, b, contact.sum / contact.count)};
+  out.sine = a.normal.cross(b.normal).norm();
   // Narrow strips that turn a little are as likely facets of a rounded body as faces with an edge between
   // them.
-  if (sine < kFacetSin &&
-      std::max(width_across(surface_, a, line), width_across(surface_, b, line)) < kFacetWidth_m)
+  if (out.sine < kFacetSin &&
+      std::max(width_across(surface_, a, out.line), width_across(surface_, b, out.line)) < kFacetWidth_m)
     return {};
-  const double gap_m = kAmbiguous * surface_.scale.noise_m / std::max(sine, 0.3);
-  const double widest = kBinSpacings * std::max(a.spacing_m, b.spacing_m) * 2 + gap_m;
-  const NearLine near_a = near_line(surface_, a, line, widest), near_b = near_line(surface_, b, line, widest);
+  out.gap_m = kAmbiguous * surface_.scale.noise_m / std::max(out.sine, 0.3);
+  const double widest = kBinSpacings * std::max(a.spacing_m, b.spacing_m) * 2 + out.gap_m;
+  const NearLine near_a = near_line(surface_, a, out.line, widest),
+                 near_b = near_line(surface_, b, out.line, widest);
   std::vector<double> spacing = near_a.spacing;
   spacing.insert(spacing.end(), near_b.spacing.begin(), near_b.spacing.end());
-  if (spacing.size() < 8) return {};
-  std::nth_element(spacing.begin(), spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2),
-                   spacing.end());
-  const double bin_m = kBinSpacings * spacing[spacing.size() / 2];
-  const Support in_a = support_of(near_a, bin_m, gap_m), in_b = support_of(near_b, bin_m, gap_m);
-  const double area = bin_m * bin_m;
+  if (spacing.size() < kFewestPoints) return {};
+  out.spacing_m = median(spacing);
+  out.bin_m = kBinSpacings * out.spacing_m;
+  out.in_a = support_of(near_a, out.bin_m, out.gap_m);
+  out.in_b = support_of(near_b, out.bin_m, out.gap_m);
+  return out;
+}
+
+/// The stretches of the line with points of both planes beside them, the ends moved to where a third plane
+/// meets them.
+std::vector<CreaseFinder::Stretch> CreaseFinder::stretches_of(const Meeting& m,
+                                                              const std::vector<std::int32_t>& thirds) const {
+  const double area = m.bin_m * m.bin_m;
   std::set<int> bins;
-  for (const auto& side : in_a.covered)
+  for (const auto& side : m.in_a.covered)
     for (const auto& [bin, covered] : side)
-      if (in_a.holds(bin, area) && in_b.holds(bin, area)) bins.insert(bin);
-  std::vector<Piece> out;
+      if (m.in_a.holds(bin, area) && m.in_b.holds(bin, area)) bins.insert(bin);
+  std::vector<Stretch> out;
   for (auto bin = bins.begin(); bin != bins.end();) {
     const int first = *bin;
     int last = first, held = 0;
     int sides_a = 0, sides_b = 0;
     for (; bin != bins.end() && *bin <= last + 1 + kLargestGap; ++bin, ++held) {
       last = *bin;
-      sides_a += in_a.side(last, area) == 1 ? 1 : -1;
-      sides_b += in_b.side(last, area) == 1 ? 1 : -1;
+      sides_a += m.in_a.side(last, area) == 1 ? 1 : -1;
+      sides_b += m.in_b.side(last, area) == 1 ? 1 : -1;
     }
-    double t0 = first * bin_m, t1 = (last + 1) * bin_m;
-    if (t1 - t0 < std::max(config_.least_length_m, 2 * bin_m) || held < 2) continue;
-    const double reach_m = bin_m + gap_m;
-    t0 = snapped(line, t0, reach_m, pair, thirds);
-    t1 = snapped(line, t1, reach_m, pair, thirds);
+    double t0 = first * m.bin_m, t1 = (last + 1) * m.bin_m;
+    if (t1 - t0 < std::max(config_.least_length_m, 2 * m.bin_m) || held < 2) continue;
+    const double reach_m = m.bin_m + m.gap_m;
+    t0 = snapped_to_third_plane(m.line, t0, reach_m, m.pair, thirds);
+    t1 = snapped_to_third_plane(m.line, t1, reach_m, m.pair, thirds);
     if (t1 - t0 < config_.least_length_m) continue;
     // The surface lies on the side of its points: out of it points the other.
-    const Eigen::Vector3d out_a = line.direction.cross(a.normal) * (sides_a > 0 ? -1 : 1);
-    const Eigen::Vector3d out_b = line.direction.cross(b.normal) * (sides_b > 0 ? -1 : 1);
-    const Eigen::Vector3d begin = line.origin + t0 * line.direction, end = line.origin + t1 * line.direction;
-    const std::vector<Eigen::Vector3d> around =
-        points_around(surface_, tree_, begin, end,
-                      strip_reach_m(surface_.scale.noise_m, sine, spacing[spacing.size() / 2]));
-    const StripFit strip_a = fit_strip(around, {begin, end, -out_a, a, b, sine, spacing[spacing.size() / 2]},
-                                       surface_.scale.noise_m);
-    const StripFit strip_b = fit_strip(around, {begin, end, -out_b, b, a, sine, spacing[spacing.size() / 2]},
-                                       surface_.scale.noise_m);
-    Piece piece;
-    piece.kind = ContourKind::crease;
-    piece.plane_a = pair.first;
-    piece.plane_b = pair.second;
-    // Both surfaces moved to where they are beside the line: n_a . x = height a, n_b . x = height b.
-    Eigen::Matrix3d rows;
-    rows << a.normal.transpose(), b.normal.transpose(), line.direction.transpose();
-    const Eigen::Matrix3d solve = rows.inverse();
-    const auto moved = [&](double t, double from_middle) -> Eigen::Vector3d {
-      return line.origin + t * line.direction +
-             solve * Eigen::Vector3d(strip_a.offset_m + strip_a.slope * from_middle,
-                                     strip_b.offset_m + strip_b.slope * from_middle, 0);
-    };
-    piece.begin = moved(t0, 0.5 * (t0 - t1));
-    piece.end = moved(t1, 0.5 * (t1 - t0));
-    piece.normal_a = out_a;
-    piece.normal_b = out_b;
-    piece.sigma_m = std::hypot(strip_a.sigma_m, strip_b.sigma_m) / (std::sqrt(2.0) * sine);
-    const auto reach_on = [&](const FittedPlane& plane) {
-      return std::max(2.5 * plane.spacing_m, 2 * surface_.scale.noise_m);
-    };
-    if (piece.sigma_m > config_.most_sigma_m || stands_before(tree_, piece, reach_on(a), reach_on(b)) ||
-        contradicted(piece))
+    out.push_back({t0, t1, m.line.direction.cross(m.a.normal) * (sides_a > 0 ? -1 : 1),
+                   m.line.direction.cross(m.b.normal) * (sides_b > 0 ? -1 : 1)});
+  }
+  return out;
+}
+
+/// The segment where both surfaces meet, each fitted to the points beside the line.
+LineSegment CreaseFinder::fit_segment(const Meeting& m, const Stretch& stretch) const {
+  const auto& [t0, t1, out_a, out_b] = stretch;
+  const Eigen::Vector3d begin = m.line.at(t0), end = m.line.at(t1);
+  const std::vector<Eigen::Vector3d> around =
+      points_around(surface_, tree_, begin, end, strip_reach_m(surface_.scale.noise_m, m.sine, m.spacing_m));
+  const StripFit strip_a =
+      fit_strip(around, {begin, end, -out_a, m.a, m.b, m.sine, m.spacing_m}, surface_.scale.noise_m);
+  const StripFit strip_b =
+      fit_strip(around, {begin, end, -out_b, m.b, m.a, m.sine, m.spacing_m}, surface_.scale.noise_m);
+  LineSegment segment;
+  segment.kind = ContourKind::crease;
+  segment.plane_a = m.pair.first;
+  segment.plane_b = m.pair.second;
+  // Both surfaces moved to where they are beside the line: n_a . x = height a, n_b . x = height b.
+  Eigen::Matrix3d rows;
+  rows << m.a.normal.transpose(), m.b.normal.transpose(), m.line.direction.transpose();
+  const Eigen::Matrix3d solve = rows.inverse();
+  const auto moved = [&](double t, double from_middle) -> Eigen::Vector3d {
+    return m.line.origin + t * m.line.direction +
+           solve * Eigen::Vector3d(strip_a.offset_m + strip_a.slope * from_middle,
+                                   strip_b.offset_m + strip_b.slope * from_middle, 0);
+  };
+  segment.begin = moved(t0, 0.5 * (t0 - t1));
+  segment.end = moved(t1, 0.5 * (t1 - t0));
+  segment.normal_a = out_a;
+  segment.normal_b = out_b;
+  segment.sigma_m = std::hypot(strip_a.sigma_m, strip_b.sigma_m) / (std::sqrt(2.0) * m.sine);
+  return segment;
+}
+
+std::vector<LineSegment> CreaseFinder::segments_of(const PlanePair& pair, const Contact& contact,
+                                                   const std::vector<std::int32_t>& thirds) const {
+  const std::optional<Meeting> meeting = meeting_of(pair, contact);
+  if (!meeting) return {};
+  const auto reach_on = [&](const FittedPlane& plane) {
+    return std::max(2.5 * plane.spacing_m, 2 * surface_.scale.noise_m);
+  };
+  std::vector<LineSegment> out;
+  for (const Stretch& stretch : stretches_of(*meeting, thirds)) {
+    const LineSegment segment = fit_segment(*meeting, stretch);
+    if (segment.sigma_m > config_.most_sigma_m ||
+        stands_before(tree_, segment, reach_on(meeting->a), reach_on(meeting->b)) ||
+        contradicted_by_profile(segment))
       continue;
-    out.push_back(piece);
+    out.push_back(segment);
   }
   return out;
 }
 
 }  // namespace
 
-std::vector<Piece> find_creases(const SurfacePoints& surface, const Neighbours& tree, const Planes& planes,
-                                const std::vector<bool>& unfit, const CreaseConfig& config,
-                                ThreadPool& pool) {
+std::vector<LineSegment> find_creases(const SurfacePoints& surface, const Neighbours& tree,
+                                      const Planes& planes, const std::vector<bool>& unfit,
+                                      const CreaseConfig& config, ThreadPool& pool) {
   const auto contacts = find_contacts(surface, planes);
   std::vector<std::vector<std::int32_t>> beside(planes.planes.size());
   std::vector<std::pair<PlanePair, Contact>> candidates;
@@ -295,76 +290,18 @@ std::vector<Piece> find_creases(const SurfacePoints& surface, const Neighbours& 
     candidates.emplace_back(pair, contact);
   }
   const CreaseFinder finder(surface, tree, planes, config);
-  std::vector<std::vector<Piece>> found(candidates.size());
+  std::vector<std::vector<LineSegment>> found(candidates.size());
   pool.for_chunks(candidates.size(), 4, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const auto& [pair, contact] = candidates[k];
       std::vector<std::int32_t> thirds = beside[static_cast<std::size_t>(pair.first)];
       const auto& more = beside[static_cast<std::size_t>(pair.second)];
       thirds.insert(thirds.end(), more.begin(), more.end());
-      found[k] = finder.pieces_of(pair, contact, thirds);
+      found[k] = finder.segments_of(pair, contact, thirds);
     }
   });
-  std::vector<Piece> out;
-  for (const auto& pieces : found) out.insert(out.end(), pieces.begin(), pieces.end());
-  return out;
-}
-
-namespace {
-
-/// Narrow planes that touch at a small angle, as facets of a column do, however few points each has.
-void mark_facets(const SurfacePoints& surface, const Planes& planes, std::vector<bool>& curved) {
-  constexpr double kLeastSin = 0.1, kMostSin = 0.75;
-  constexpr int kFewestContacts = 12;
-  for (const auto& [pair, contact] : find_contacts(surface, planes)) {
-    const auto first = static_cast<std::size_t>(pair.first), second = static_cast<std::size_t>(pair.second);
-    const FittedPlane &a = planes.planes[first], &b = planes.planes[second];
-    const double sine = a.normal.cross(b.normal).norm();
-    if (contact.count < kFewestContacts || sine < kLeastSin || sine > kMostSin) continue;
-    const Line line = intersection(a, b, contact.sum / contact.count);
-    if (std::max(width_across(surface, a, line), width_across(surface, b, line)) > kFacetWidth_m) continue;
-    curved[first] = curved[second] = true;
-  }
-}
-
-}  // namespace
-
-std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes) {
-  std::vector<bool> out(planes.planes.size(), false);
-  for (std::size_t p = 0; p < planes.planes.size(); ++p) {
-    const FittedPlane& plane = planes.planes[p];
-    const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
-    // Height over the plane as a quadratic form: 1, x, y, x^2, xy, y^2.
-    Eigen::Matrix<double, 6, 6> squares = Eigen::Matrix<double, 6, 6>::Zero();
-    Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
-    Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-    for (const std::uint32_t i : plane.points) {
-      const Eigen::Vector3d x = surface.position[i].cast<double>() - plane.centre;
-      const double a = u.dot(x), b = v.dot(x), height = plane.normal.dot(x);
-      Eigen::Matrix<double, 6, 1> row;
-      row << 1, a, b, a * a, a * b, b * b;
-      squares += row * row.transpose();
-      right += height * row;
-      spread += Eigen::Vector2d(a, b) * Eigen::RowVector2d(a, b);
-    }
-    spread /= static_cast<double>(plane.points.size());
-    const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(squares);
-    const Eigen::Matrix<double, 6, 1> form = solver.solve(right);
-    if (solver.info() != Eigen::Success || !form.allFinite()) continue;
-    Eigen::Matrix2d hessian;
-    hessian << 2 * form[3], form[4], form[4], 2 * form[5];
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> bend(hessian);
-    const int k = std::abs(bend.eigenvalues()[1]) > std::abs(bend.eigenvalues()[0]) ? 1 : 0;
-    const Eigen::Vector2d axis = bend.eigenvectors().col(k);
-    // A strip of width w has the spread w / sqrt(12).
-    const double width = std::sqrt(12 * axis.dot(spread * axis));
-    const double turn = std::abs(bend.eigenvalues()[k]) * width;
-    // The curvature's own error: that of a parabola over a strip, 12 sqrt(5) noise / (sqrt(n) w^2).
-    const double sigma_turn =
-        12 * std::sqrt(5.0) * plane.rms_m / (std::sqrt(static_cast<double>(plane.points.size())) * width);
-    out[p] = turn > 0.2 && turn > 4 * sigma_turn;
-  }
-  mark_facets(surface, planes, out);
+  std::vector<LineSegment> out;
+  for (const auto& segments : found) out.insert(out.end(), segments.begin(), segments.end());
   return out;
 }
 

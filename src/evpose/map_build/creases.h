@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "evpose/map_build/piece.h"
+#include "evpose/map_build/line_segment.h"
 #include "evpose/map_build/planes.h"
 
 namespace evpose {
@@ -16,19 +16,16 @@ class Neighbours;
 
 struct CreaseConfig {
   double least_angle_rad = 0.35;  ///< between two planes that make a crease
-  double least_length_m = 0.08;   ///< of a piece
-  double most_sigma_m = 0.006;    ///< of a piece's place
+  double least_length_m = 0.08;   ///< of a segment
+  double most_sigma_m = 0.006;    ///< of a segment's place
 };
 
-/// Where two planes meet: pieces of the line in which they intersect, as far as both have points up to it.
+/// Where two planes meet: segments of the line in which they intersect, as far as both have points up to it.
 /// Near the line each plane is fitted again to the points beside it: walls carry skirtings, floors sag, scans
 /// are registered to a centimetre. Ends near a third plane that touches one of the two go to the point where
 /// the three meet. Planes that are `unfit` make none.
-std::vector<Piece> find_creases(const SurfacePoints& surface, const Neighbours& tree, const Planes& planes,
-                                const std::vector<bool>& unfit, const CreaseConfig& config, ThreadPool& pool);
-
-/// For each plane whether its points bend like a cylinder, by more than the noise and over an angle that
-/// matters: a facet of a column, pipe or vault.
-std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes);
+std::vector<LineSegment> find_creases(const SurfacePoints& surface, const Neighbours& tree,
+                                      const Planes& planes, const std::vector<bool>& unfit,
+                                      const CreaseConfig& config, ThreadPool& pool);
 
 }  // namespace evpose::map_build

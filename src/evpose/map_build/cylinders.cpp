@@ -19,14 +19,14 @@ namespace {
 constexpr std::array<double, 2> kSeedRadii_m = {0.25, 0.5};
 constexpr std::size_t kFewestAtSeed = 20, kMostAtSeed = 400;
 constexpr double kElongated = 0.1;     // second over first spread of a pole's stretch
-constexpr double kBent = 0.06;         // least spread of a bent surface's normals ...
-constexpr double kStraight = 0.05;     // ... across its axis, and most along it
+constexpr double kBent = 0.06;         // least spread of a bent surface's normals across its axis
+constexpr double kStraight = 0.05;     // most spread of a bent surface's normals along its axis
 constexpr double kGate = 3;            // noise: of a cylinder's points
-constexpr double kClear_m = 0.05;      // around a body there is nothing but itself
-constexpr double kOwnShare = 0.7;      // ... of the points there
+constexpr double kClear_m = 0.05;      // around a body: most of the points there are its own
+constexpr double kOwnShare = 0.7;      // of the points around a body: its own
 constexpr double kSlab_m = 0.1;        // step along the axis
-constexpr double kPoleWidth_m = 0.03;  // rms of its points from its axis, or ...
-constexpr double kPoleNoise = 2;       // ... noise
+constexpr double kPoleWidth_m = 0.03;  // rms of a pole's points from its axis
+constexpr double kPoleNoise = 2;       // noise: the same, where that is more
 constexpr double kLeastLength_m = 0.3;
 constexpr double kSlender = 5;                  // length over radius of a pole
 constexpr double kLeastRadius = 2;              // noise: thinner bodies are poles
@@ -69,11 +69,11 @@ class CylinderFinder {
   std::optional<Model> around(const Axis& axis, const std::vector<std::uint32_t>& points) const;
   std::optional<Model> column_at(const std::vector<std::uint32_t>& points) const;
   std::optional<Model> refined(const Model& start, const std::vector<std::uint32_t>& points) const;
-  struct Followed {
+  struct Stretch {
     std::vector<std::uint32_t> points;
     double first = 0, last = 0;  ///< along the axis
   };
-  Followed followed(const Model& model) const;
+  Stretch points_along(const Model& model) const;
   std::optional<Cylinder> cylinder(Model model, std::vector<std::uint32_t>& points) const;
   double gate_m(const Model& model) const {
     const double noise = kGate * surface_.scale.noise_m;
@@ -186,12 +186,12 @@ std::optional<Model> CylinderFinder::refined(const Model& start,
 
 /// Its points, slab by slab along the axis from the origin on, for as long as there are enough and little
 /// else is around.
-CylinderFinder::Followed CylinderFinder::followed(const Model& model) const {
+CylinderFinder::Stretch CylinderFinder::points_along(const Model& model) const {
   const double gate = gate_m(model), reach = model.radius_m + gate + kClear_m;
   const double around = std::max(std::numbers::pi / 2 * model.radius_m, 0.01);
   const double enough =
       std::max(2.0, 0.3 * kSlab_m * around / (surface_.scale.spacing_m * surface_.scale.spacing_m));
-  Followed out;
+  Stretch out;
   std::vector<std::uint32_t> near, slab;
   for (const int way : {-1, 1}) {
     int empty = 0;
@@ -232,12 +232,12 @@ CylinderFinder::Followed CylinderFinder::followed(const Model& model) const {
 /// Follows and fits in turns; `points` are its own then.
 std::optional<Cylinder> CylinderFinder::cylinder(Model model, std::vector<std::uint32_t>& points) const {
   const double noise = surface_.scale.noise_m;
-  Followed along;
+  Stretch along;
   // A short stretch tells the direction badly: each round follows further.
   constexpr int kRounds = 6;
   std::size_t before = 0;
   for (int round = 0; round < kRounds; ++round) {
-    along = followed(model);
+    along = points_along(model);
     if (along.points.size() < kFewestPoints) return {};
     if (round > 1 && 50 * along.points.size() < 51 * before) break;
     before = along.points.size();
@@ -285,11 +285,11 @@ std::optional<Cylinder> CylinderFinder::cylinder(Model model, std::vector<std::u
 
 std::vector<Cylinder> CylinderFinder::find() {
   std::vector<Cylinder> out;
-  std::vector<std::uint8_t> looked_at(free_.size(), 0);
+  std::vector<std::uint8_t> examined(free_.size(), 0);
   std::vector<std::uint32_t> near;
   // Points come in the order of a Z-curve: seeds that differ lie apart.
   for (std::uint32_t seed = 0; seed < free_.size(); ++seed) {
-    if (free_[seed] == 0 || looked_at[seed] != 0) continue;
+    if (free_[seed] == 0 || examined[seed] != 0) continue;
     bool found = false;
     for (const double radius_m : kSeedRadii_m) {
       const auto points = free_around(at(seed), radius_m);
@@ -307,7 +307,7 @@ std::vector<Cylinder> CylinderFinder::find() {
     }
     if (found) continue;
     tree_.within(surface_.position[seed], static_cast<float>(0.4 * kSeedRadii_m.front()), near);
-    for (const std::uint32_t i : near) looked_at[i] = 1;
+    for (const std::uint32_t i : near) examined[i] = 1;
   }
   return out;
 }

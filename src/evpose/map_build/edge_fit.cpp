@@ -14,11 +14,11 @@ constexpr double kMovedByBlur = 0.3;
 constexpr double kWindow = 2.5;            // noise: half width of what is taken for one surface
 constexpr double kReachNoise = 4;          // noise: of what is looked at around an edge
 constexpr double kFewestHanging = 8;       // points of a second face
-constexpr double kLeastHanging = 0.3;      // ... and its density, as a share of the plane's
+constexpr double kLeastHanging = 0.3;      // density of a second face, as a share of the plane's
 constexpr double kMostUnexplained = 0.1;   // share of the points at an edge that no surface there explains
 constexpr double kLeastGain = 10;          // of log likelihood, by a second face
 constexpr double kHigh = 1.2;              // noise: few of the plane's points are further from it
-constexpr double kDenser = 1.5;            // ... and over the plane's density
+constexpr double kDenser = 1.5;            // density over the plane's that tells of a second face
 constexpr double kExcess = 3;              // sigma: of points at the edge over chance
 constexpr std::size_t kMostPoints = 1200;  // for one edge
 constexpr double kUneven = 0.1;            // noise: that many points do not average away
@@ -149,20 +149,21 @@ StepFit EdgeFitter::likeliest(const std::vector<Eigen::Vector3d>& points, double
 
 /// The second face that begins at the edge, and where that puts it; `side` is 0 if there is none. Nothing if
 /// there is something that is no face, or more than faces: what ends where is open.
-std::optional<SectionFit> EdgeFitter::second_face(const Edge& edge) const {
+std::optional<EdgeProfileFit> EdgeFitter::second_face(const Edge& edge) const {
   const double noise = surface_.scale.noise_m;
-  const SectionWindow window = section_window(edge.half_length, noise, plane_.rms_m, plane_.spacing_m);
-  const SectionFit section =
-      fit_section(local_points(edge, std::hypot(window.half_width, window.half_height)), window);
-  const bool likelier = section.side != 0 && section.gain >= kLeastGain;
-  const double on_face = section.face * 2 * edge.half_length * section.depth;
-  const bool dense = on_face >= kFewestHanging && section.face >= kLeastHanging * section.plane;
-  if (likelier && (!dense || section.rest_share > kMostUnexplained)) return {};
-  return likelier ? section : SectionFit{};
+  const EdgeProfileWindow window =
+      edge_profile_window(edge.half_length, noise, plane_.rms_m, plane_.spacing_m);
+  const EdgeProfileFit profile =
+      fit_edge_profile(local_points(edge, std::hypot(window.half_width, window.half_height)), window);
+  const bool likelier = profile.side != 0 && profile.gain >= kLeastGain;
+  const double on_face = profile.face * 2 * edge.half_length * profile.depth;
+  const bool dense = on_face >= kFewestHanging && profile.face >= kLeastHanging * profile.plane;
+  if (likelier && (!dense || profile.rest_share > kMostUnexplained)) return {};
+  return likelier ? profile : EdgeProfileFit{};
 }
 
 /// Moves the edge to where the plane's density falls off.
-StepFit EdgeFitter::settle(Edge& edge) const {
+StepFit EdgeFitter::move_to_density_step(Edge& edge) const {
   const double noise = surface_.scale.noise_m, half_width = 2.5 * cell_m_;
   const double softest = std::max(noise, 0.3 * plane_.spacing_m);
   StepFit best;
@@ -188,7 +189,7 @@ FittedEdge EdgeFitter::fit(const Edge& edge) const {
   FittedEdge out;
   out.edge = edge;
   const double noise = surface_.scale.noise_m;
-  const StepFit best = settle(out.edge);
+  const StepFit best = move_to_density_step(out.edge);
   if (!best.converged) return out;
   if (best.blur_m > most_blur_noise_ * std::max(noise, 0.3 * plane_.spacing_m)) {
     out.verdict = FittedEdge::Verdict::soft;
@@ -196,14 +197,14 @@ FittedEdge EdgeFitter::fit(const Edge& edge) const {
   }
   out.across_m = std::hypot(best.sigma_place, 0.5 * edge.half_length * best.sigma_slope);
   out.moved_m = kMovedByBlur * best.blur_m;  // what blurs a free edge also moves it
-  const std::optional<SectionFit> section = second_face(out.edge);
-  if (!section || (section->side == 0 && best.rest > kMostRest)) return out;
-  out.section = *section;
-  if (section->side != 0) {
+  const std::optional<EdgeProfileFit> profile = second_face(out.edge);
+  if (!profile || (profile->side == 0 && best.rest > kMostRest)) return out;
+  out.profile = *profile;
+  if (profile->side != 0) {
     const double uneven = std::max(kUneven * noise, plane_.uneven_m);
-    out.across_m = std::hypot(section->sigma_place, uneven);
-    out.moved_m = std::hypot(section->sigma_height, uneven);
-    out.edge.shift(section->place, section->slope);
+    out.across_m = std::hypot(profile->sigma_place, uneven);
+    out.moved_m = std::hypot(profile->sigma_height, uneven);
+    out.edge.shift(profile->place, profile->slope);
   }
   out.verdict = FittedEdge::Verdict::sharp;
   return out;

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "evpose/map_build/edge_profile_fit.h"
 #include "evpose/map_build/outlines.h"
 #include "evpose/map_build/planes.h"
-#include "evpose/map_build/section_fit.h"
 #include "evpose/map_build/step_fit.h"
 
 namespace evpose::map_build {
@@ -37,9 +37,9 @@ struct FittedEdge {
   enum class Verdict { sharp, soft, unclear };
   Verdict verdict = Verdict::unclear;  ///< soft: the surface fades out, as a shadow of moving scans does
   Edge edge;                           ///< where the surface ends
-  SectionFit section;                  ///< its second face; `side` is 0 if there is none
+  EdgeProfileFit profile;              ///< its second face; `side` is 0 if there is none
   double across_m = 0;                 ///< error within the plane, 1 sigma
-  double moved_m = 0;                  ///< ... across it, or what the edge's softness may have moved it by
+  double moved_m = 0;  ///< error across the plane, or what the edge's softness may have moved it by
 };
 
 /// Fits where a plane ends to all points near an edge.
@@ -60,8 +60,8 @@ class EdgeFitter {
   OwnPoints own_points(const std::vector<Eigen::Vector3d>& local, double half_width) const;
   static StepFit likeliest(const std::vector<Eigen::Vector3d>& points, double half_length, double half_width,
                            double shear, std::span<const double> blurs);
-  std::optional<SectionFit> second_face(const Edge& edge) const;
-  StepFit settle(Edge& edge) const;
+  std::optional<EdgeProfileFit> second_face(const Edge& edge) const;
+  StepFit move_to_density_step(Edge& edge) const;
 
   const SurfacePoints& surface_;
   const Neighbours& tree_;

@@ -14,6 +14,7 @@
 #include "evpose/core/parallel.h"
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/contrast.h"
+#include "evpose/map_build/curved_planes.h"
 #include "evpose/map_build/cylinders.h"
 #include "evpose/map_build/tiles.h"
 #include "evpose/map_build/view_points.h"
@@ -27,48 +28,48 @@ double seconds(Clock::duration d) { return std::chrono::duration<double>(d).coun
 
 const Error kGivenUp{"map build", "interrupted", "nothing was written"};
 
-void add_points(const Piece& piece, std::int32_t number, std::int8_t contrast, double spacing_m,
+void add_points(const LineSegment& segment, std::int32_t number, std::int8_t contrast, double spacing_m,
                 ContourMap& map) {
-  const int count = std::max(1, static_cast<int>(std::lround(piece.length_m() / spacing_m)));
+  const int count = std::max(1, static_cast<int>(std::lround(segment.length_m() / spacing_m)));
   ContourPoint p;
   // Where the faces run uneven beside it, an edge is turned a little against its planes.
-  const Eigen::Vector3d along = piece.tangent();
+  const Eigen::Vector3d along = segment.tangent();
   const auto across = [&](const Eigen::Vector3d& normal) -> Eigen::Vector3f {
     const Eigen::Vector3d out = normal - along.dot(normal) * along;
     return out.norm() > 0.5 ? Eigen::Vector3f(out.normalized().cast<float>()) : Eigen::Vector3f::Zero();
   };
-  p.normal = across(piece.normal_a);
-  p.normal_b = across(piece.normal_b);
+  p.normal = across(segment.normal_a);
+  p.normal_b = across(segment.normal_b);
   p.tangent = along.cast<float>();
-  p.length = static_cast<float>(piece.length_m() / count);
-  p.sigma = static_cast<float>(piece.sigma_m);
+  p.length = static_cast<float>(segment.length_m() / count);
+  p.sigma = static_cast<float>(segment.sigma_m);
   p.contour = number;
-  p.plane_a = piece.plane_a;
-  p.plane_b = piece.plane_b;
-  p.kind = piece.kind;
+  p.plane_a = segment.plane_a;
+  p.plane_b = segment.plane_b;
+  p.kind = segment.kind;
   p.contrast = contrast;
   for (int k = 0; k < count; ++k) {
-    p.position = (piece.begin + (piece.end - piece.begin) * ((k + 0.5) / count)).cast<float>();
+    p.position = (segment.begin + (segment.end - segment.begin) * ((k + 0.5) / count)).cast<float>();
     map.points.push_back(p);
   }
 }
 
 /// Corners of outlines near fitted contours go onto these, so that the surface ends where its contour is.
-Eigen::Vector3d drawn_to_contours(const Eigen::Vector3d& corner, const std::vector<Piece>& pieces,
-                                  double reach_m) {
-  const Piece* nearest = nullptr;
+Eigen::Vector3d snapped_to_contours(const Eigen::Vector3d& corner, const std::vector<LineSegment>& segments,
+                                    double reach_m) {
+  const LineSegment* nearest = nullptr;
   double least = reach_m;
-  for (const Piece& piece : pieces)
-    if (const double d = distance(piece, corner); d < least) least = d, nearest = &piece;
+  for (const LineSegment& segment : segments)
+    if (const double d = distance(segment, corner); d < least) least = d, nearest = &segment;
   if (nearest == nullptr) return corner;
   const Eigen::Vector3d t = nearest->tangent();
   Eigen::Vector3d out = nearest->begin + t * t.dot(corner - nearest->begin);
   // A corner of two contours: go along the first to the second.
-  const Piece* second = nullptr;
+  const LineSegment* second = nullptr;
   least = reach_m;
-  for (const Piece& piece : pieces) {
-    if (&piece == nearest || std::abs(piece.tangent().dot(t)) > 0.8) continue;
-    if (const double d = distance(piece, out); d < least) least = d, second = &piece;
+  for (const LineSegment& segment : segments) {
+    if (&segment == nearest || std::abs(segment.tangent().dot(t)) > 0.8) continue;
+    if (const double d = distance(segment, out); d < least) least = d, second = &segment;
   }
   if (second == nullptr) return out;
   const Eigen::Vector3d s = second->tangent(), w = out - second->begin;
@@ -77,7 +78,7 @@ Eigen::Vector3d drawn_to_contours(const Eigen::Vector3d& corner, const std::vect
 }
 
 void add_polygons(const FittedPlane& plane, std::int32_t number, const Outline& outline,
-                  const std::vector<Piece>& pieces, double noise_m, ContourMap& map) {
+                  const std::vector<LineSegment>& segments, double noise_m, ContourMap& map) {
   const PlaneFrame frame(plane);
   const auto first = static_cast<std::int32_t>(map.polygons.size());
   for (const Ring& ring : outline.solid) {
@@ -86,14 +87,15 @@ void add_polygons(const FittedPlane& plane, std::int32_t number, const Outline& 
     polygon.hole_of = ring.hole_of < 0 ? -1 : first + ring.hole_of;
     for (const auto& corner : ring.corners)
       polygon.vertices.push_back(
-          drawn_to_contours(frame.lift(corner), pieces, 1.5 * outline.cell_m + 2 * noise_m).cast<float>());
+          snapped_to_contours(frame.lift(corner), segments, 1.5 * outline.cell_m + 2 * noise_m)
+              .cast<float>());
     map.polygons.push_back(std::move(polygon));
   }
 }
 
 /// The axis of a round body, whose silhouette is as far from it as its radius.
-Piece axis_of(const Cylinder& cylinder) {
-  Piece out;
+LineSegment axis_of(const Cylinder& cylinder) {
+  LineSegment out;
   out.kind = ContourKind::cylinder_axis;
   out.begin = cylinder.begin;
   out.end = cylinder.end;
@@ -145,85 +147,157 @@ void describe(ConfigTable& table, BuildConfig& c) {
 
 namespace {
 
+/// What a tile is made of, and the tools to work on it.
+struct TileTask {
+  const Tile& tile;
+  const BuildConfig& config;
+  ThreadPool& pool;
+  std::span<const View> views;
+  const std::function<bool(double)>& progress;
+};
+
+/// What was found in a tile.
+struct TileContents {
+  SurfacePoints surface;
+  std::vector<std::uint8_t> brightness;  ///< of each surface point; empty: unknown
+  Planes planes;
+  std::vector<bool> curved, unfit;  ///< planes that bend, and that have no contours
+  std::vector<LineSegment> creases;
+  std::vector<std::vector<LineSegment>> edges_of;  ///< creases of each plane, later its boundaries as well
+  std::vector<Outline> outlines;
+  std::vector<Boundaries> boundaries;
+  std::vector<Cylinder> cylinders;
+};
+
+/// Planes that bend or are a mixture of surfaces have no contours.
+std::vector<bool> unfit_for_contours(const TileContents& found, const PlaneConfig& config) {
+  std::vector<bool> unfit = found.curved;
+  const double roughest_m = config.most_rough * typical_roughness(found.planes);
+  for (std::size_t p = 0; p < unfit.size(); ++p)
+    unfit[p] = unfit[p] || found.planes.planes[p].rms_m > roughest_m ||
+               found.planes.planes[p].tilt_sigma_rad() > config.most_tilt_rad;
+  return unfit;
+}
+
+/// Creases, outlines, boundaries and round bodies of the planes. False: given up.
+bool find_contours(const TileTask& task, const Neighbours& tree, TileContents& found) {
+  const SurfacePoints& surface = found.surface;
+  const Planes& planes = found.planes;
+  found.curved = find_curved(surface, planes);
+  found.unfit = unfit_for_contours(found, task.config.plane);
+  found.creases = find_creases(surface, tree, planes, found.unfit, task.config.crease, task.pool);
+  if (!task.progress(0.85)) return false;
+  found.edges_of.resize(planes.planes.size());
+  for (const LineSegment& crease : found.creases)
+    for (const std::int32_t plane : {crease.plane_a, crease.plane_b})
+      found.edges_of[static_cast<std::size_t>(plane)].push_back(crease);
+  found.outlines.resize(planes.planes.size());
+  task.pool.for_chunks(planes.planes.size(), 1, [&](std::size_t p, std::size_t, std::size_t) {
+    found.outlines[p] = trace_outline(surface, planes.planes[p]);
+  });
+  found.boundaries =
+      find_boundaries({surface, tree, planes, found.unfit, found.outlines, found.edges_of, task.views},
+                      task.config.boundary, task.pool);
+  if (!task.progress(0.95)) return false;
+  found.cylinders = find_cylinders(surface, tree, planes, found.curved);
+  return true;
+}
+
+/// Adds to a map what lies in a tile's core.
+class TileWriter {
+ public:
+  TileWriter(const TileTask& task, const Neighbours& tree, TileContents& found, BuiltMap& out)
+      : task_(task),
+        tree_(tree),
+        found_(found),
+        map_(out.map),
+        figures_(out.figures),
+        first_plane_(static_cast<std::int32_t>(out.map.planes.size())) {}
+
+  void add_all();
+
+ private:
+  void add(const LineSegment& whole);
+  void add_plane(std::size_t p);
+
+  const TileTask& task_;
+  const Neighbours& tree_;
+  TileContents& found_;
+  ContourMap& map_;
+  BuildFigures& figures_;
+  std::int32_t first_plane_;
+  std::int32_t chain_ = -1;  ///< of the last segment
+};
+
+void TileWriter::add(const LineSegment& whole) {
+  std::optional<LineSegment> segment = clipped(whole, task_.tile);
+  if (!segment) return;
+  if (segment->plane_a >= 0) segment->plane_a += first_plane_;
+  if (segment->plane_b >= 0) segment->plane_b += first_plane_;
+  const bool same_curve = segment->chain >= 0 && segment->chain == chain_ && !map_.points.empty() &&
+                          map_.points.back().plane_a == segment->plane_a;
+  chain_ = segment->chain;
+  const std::int32_t number = map_.points.empty() ? 0 : map_.points.back().contour + (same_curve ? 0 : 1);
+  const std::int8_t contrast = found_.brightness.empty()
+                                   ? std::int8_t{0}
+                                   : contrast_of(*segment, found_.surface, tree_, found_.brightness);
+  add_points(*segment, number, contrast, task_.config.point_spacing_m, map_);
+  figures_.by_kind_m[static_cast<std::size_t>(segment->kind)] += segment->length_m();
+}
+
+/// A plane with its boundaries and the polygons that hide what is behind it.
+void TileWriter::add_plane(std::size_t p) {
+  const FittedPlane& plane = found_.planes.planes[p];
+  for (const LineSegment& boundary : found_.boundaries[p].segments) {
+    add(boundary);
+    if (!is_view_dependent(boundary.kind)) found_.edges_of[p].push_back(boundary);
+  }
+  figures_.left_out_m += found_.boundaries[p].left_out_m;
+  for (const std::uint32_t i : plane.points)
+    figures_.in_planes += task_.tile.holds(found_.surface.position[i]) ? 1 : 0;
+  figures_.curved += found_.curved[p] ? 1 : 0;
+  add_polygons(plane, first_plane_ + static_cast<std::int32_t>(p), found_.outlines[p], found_.edges_of[p],
+               found_.surface.scale.noise_m, map_);
+  map_.planes.push_back({plane.normal.cast<float>(), plane.d, static_cast<std::uint32_t>(plane.points.size()),
+                         static_cast<float>(plane.rms_m)});
+}
+
+void TileWriter::add_all() {
+  for (const LineSegment& crease : found_.creases) add(crease);
+  for (std::size_t p = 0; p < found_.planes.planes.size(); ++p) add_plane(p);
+  for (const Cylinder& cylinder : found_.cylinders) {
+    add(axis_of(cylinder));
+    const Eigen::Vector3f middle = (0.5 * (cylinder.begin + cylinder.end)).cast<float>();
+    if (task_.tile.holds(middle)) ++(cylinder.is_pole ? figures_.poles : figures_.cylinders);
+  }
+  figures_.scale = found_.surface.scale;
+}
+
 /// Finds what one tile holds and adds to the map what lies in its core.
-Status build_tile(PointCloud cloud, const Tile& tile, const BuildConfig& config, ThreadPool& pool,
-                  std::span<const View> views, const std::function<bool(double)>& progress, BuiltMap& out) {
-  ContourMap& map = out.map;
+Status build_tile(PointCloud cloud, const TileTask& task, BuiltMap& out) {
+  const BuildConfig& config = task.config;
   BuildFigures& figures = out.figures;
-  figures.duplicates += put_in_order(cloud);
+  figures.duplicates += sort_and_deduplicate(cloud);
   const Neighbours tree(cloud.points);
   const auto scale = measure_scale(cloud.points, tree, config.patch, cloud.source);
   if (!scale) return scale.error();
   if (scale->noise_m > kWorstNoise_m && figures.scale.noise_m == 0)
     log_warning(text(cloud.source, ": noise of ", std::lround(1e3 * scale->noise_m),
                      " mm across the surfaces: are these centimetres? Metres are expected"));
-  if (!progress(0.1)) return kGivenUp;
+  if (!task.progress(0.1)) return kGivenUp;
   const auto start = Clock::now();
-  const SurfacePoints surface = describe_surface(std::move(cloud.points), tree, *scale, config.patch, pool);
-  if (!progress(0.6)) return kGivenUp;
+  TileContents found;
+  found.surface = describe_surface(std::move(cloud.points), tree, *scale, config.patch, task.pool);
+  found.brightness = std::move(cloud.brightness);
+  if (!task.progress(0.6)) return kGivenUp;
   const auto described = Clock::now();
-  const Planes planes = find_planes(surface, config.plane);
+  found.planes = find_planes(found.surface, config.plane);
   figures.normals_s += seconds(described - start);
   figures.planes_s += seconds(Clock::now() - described);
-  if (planes.planes.empty()) return Error{cloud.source, "no plane has enough points", "give a denser cloud"};
-  if (!progress(0.8)) return kGivenUp;
-  const std::vector<bool> curved = find_curved(surface, planes);
-  std::vector<bool> unfit = curved;  // for contours: bent, or a mixture of surfaces
-  const double roughest_m = config.plane.most_rough * typical_roughness(planes);
-  for (std::size_t p = 0; p < unfit.size(); ++p)
-    unfit[p] = unfit[p] || planes.planes[p].rms_m > roughest_m ||
-               planes.planes[p].tilt_sigma_rad() > config.plane.most_tilt_rad;
-  const std::vector<Piece> creases = find_creases(surface, tree, planes, unfit, config.crease, pool);
-  if (!progress(0.85)) return kGivenUp;
-  std::vector<std::vector<Piece>> pieces(planes.planes.size());
-  for (const Piece& piece : creases)
-    for (const std::int32_t plane : {piece.plane_a, piece.plane_b})
-      pieces[static_cast<std::size_t>(plane)].push_back(piece);
-  std::vector<Outline> outlines(planes.planes.size());
-  pool.for_chunks(planes.planes.size(), 1, [&](std::size_t p, std::size_t, std::size_t) {
-    outlines[p] = trace_outline(surface, planes.planes[p]);
-  });
-  const std::vector<Boundaries> boundaries =
-      find_boundaries({surface, tree, planes, unfit, outlines, pieces, views}, config.boundary, pool);
-  if (!progress(0.95)) return kGivenUp;
-  const std::vector<Cylinder> cylinders = find_cylinders(surface, tree, planes, curved);
-  const auto first_plane = static_cast<std::int32_t>(map.planes.size());
-  std::int32_t chain = -1;  // of the last piece
-  const auto add = [&](const Piece& whole) {
-    std::optional<Piece> piece = clipped(whole, tile);
-    if (!piece) return;
-    if (piece->plane_a >= 0) piece->plane_a += first_plane;
-    if (piece->plane_b >= 0) piece->plane_b += first_plane;
-    const bool goes_on = piece->chain >= 0 && piece->chain == chain && !map.points.empty() &&
-                         map.points.back().plane_a == piece->plane_a;
-    chain = piece->chain;
-    const std::int32_t number = map.points.empty() ? 0 : map.points.back().contour + (goes_on ? 0 : 1);
-    const std::int8_t contrast =
-        cloud.brightness.empty() ? std::int8_t{0} : contrast_of(*piece, surface, tree, cloud.brightness);
-    add_points(*piece, number, contrast, config.point_spacing_m, map);
-    figures.by_kind_m[static_cast<std::size_t>(piece->kind)] += piece->length_m();
-  };
-  for (const Piece& piece : creases) add(piece);
-  for (std::size_t p = 0; p < planes.planes.size(); ++p) {
-    const FittedPlane& plane = planes.planes[p];
-    for (const Piece& piece : boundaries[p].pieces) {
-      add(piece);
-      if (!is_view_dependent(piece.kind)) pieces[p].push_back(piece);
-    }
-    figures.left_out_m += boundaries[p].left_out_m;
-    for (const std::uint32_t i : plane.points) figures.in_planes += tile.holds(surface.position[i]) ? 1 : 0;
-    figures.curved += curved[p] ? 1 : 0;
-    add_polygons(plane, first_plane + static_cast<std::int32_t>(p), outlines[p], pieces[p], scale->noise_m,
-                 map);
-    map.planes.push_back({plane.normal.cast<float>(), plane.d,
-                          static_cast<std::uint32_t>(plane.points.size()), static_cast<float>(plane.rms_m)});
-  }
-  for (const Cylinder& cylinder : cylinders) {
-    add(axis_of(cylinder));
-    const Eigen::Vector3f middle = (0.5 * (cylinder.begin + cylinder.end)).cast<float>();
-    if (tile.holds(middle)) ++(cylinder.is_pole ? figures.poles : figures.cylinders);
-  }
-  figures.scale = *scale;
+  if (found.planes.planes.empty())
+    return Error{cloud.source, "no plane has enough points", "give a denser cloud"};
+  if (!task.progress(0.8) || !find_contours(task, tree, found)) return kGivenUp;
+  TileWriter(task, tree, found, out).add_all();
   return {};
 }
 
@@ -243,7 +317,7 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   std::optional<Error> barren;  // what a tile without planes said
   for (std::size_t k = 0; k < tiles.size(); ++k) {
     bool given_up = false;
-    const auto share = [&](double done) {
+    const std::function<bool(double)> share_done = [&](double done) {
       given_up = !progress((static_cast<double>(k) + done) / static_cast<double>(tiles.size()));
       return !given_up;
     };
@@ -251,9 +325,10 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
     if (tiles.size() == 1)
       std::swap(part, cloud);
     else
-      part = part_of(cloud, tiles[k]);
-    if (!share(0)) return kGivenUp;
-    if (const Status done = build_tile(std::move(part), tiles[k], config, pool, views, share, out); !done) {
+      part = points_seen_by(cloud, tiles[k]);
+    if (!share_done(0)) return kGivenUp;
+    const TileTask task{tiles[k], config, pool, views, share_done};
+    if (const Status done = build_tile(std::move(part), task, out); !done) {
       if (given_up) return kGivenUp;
       barren = done.error();
     }

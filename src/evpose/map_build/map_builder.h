@@ -27,8 +27,8 @@ struct BuildConfig {
   CreaseConfig crease;
   BoundaryConfig boundary;
   double point_spacing_m = 0.02;  ///< of the contours' points in the map
-  double tile_points = 4e6;       ///< larger clouds are worked on in tiles of about so many points ...
-  double tile_overlap_m = 1;      ///< ... which see so much of their neighbours
+  double tile_points = 4e6;       ///< larger clouds are worked on in tiles of about so many points
+  double tile_overlap_m = 1;      ///< width of the border in which a tile sees its neighbours
 };
 void describe(ConfigTable& table, BuildConfig& config);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/map_build/neighbours.h"
 
+#include <cmath>
 #include <nanoflann.hpp>
 
 namespace evpose::map_build {
@@ -33,6 +34,13 @@ Neighbours::~Neighbours() = default;
 std::size_t Neighbours::nearest(const Eigen::Vector3f& p, std::span<std::uint32_t> indices,
                                 std::span<float> squares) const {
   return tree_->index.knnSearch(p.data(), indices.size(), indices.data(), squares.data());
+}
+
+bool Neighbours::any_within(const Eigen::Vector3d& p, double reach_m) const {
+  std::uint32_t index = 0;
+  float square = 0;
+  return nearest(p.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
+         std::sqrt(static_cast<double>(square)) < reach_m;
 }
 
 void Neighbours::within(const Eigen::Vector3f& p, float radius_m, std::vector<std::uint32_t>& out) const {

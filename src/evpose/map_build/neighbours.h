@@ -23,6 +23,9 @@ class Neighbours {
   std::size_t nearest(const Eigen::Vector3f& p, std::span<std::uint32_t> indices,
                       std::span<float> squares) const;
 
+  /// True if a point is nearer to `p` than `reach_m`.
+  bool any_within(const Eigen::Vector3d& p, double reach_m) const;
+
   /// Numbers of the points within `radius_m` of `p`, in an order that depends on the points alone.
   void within(const Eigen::Vector3f& p, float radius_m, std::vector<std::uint32_t>& out) const;
 

@@ -17,15 +17,15 @@ class Normal {
       below_[static_cast<std::size_t>(k)] = 0.5 * std::erfc(-x / std::numbers::sqrt2);
     }
   }
-  double density(double x) const { return look(density_, x, 0, 0); }
-  double below(double x) const { return look(below_, x, 0, 1); }
+  double density(double x) const { return interpolate(density_, x, 0, 0); }
+  double below(double x) const { return interpolate(below_, x, 0, 1); }
   /// Integral of below() from minus infinity.
   double ramp(double x) const { return x * below(x) + density(x); }
 
  private:
   static constexpr int kPerUnit = 128, kCells = 14 * kPerUnit;
   using Table = std::array<double, kCells + 1>;
-  static double look(const Table& table, double x, double low, double high) {
+  static double interpolate(const Table& table, double x, double low, double high) {
     const double at = x * kPerUnit + 0.5 * kCells;
     if (!(at > 0)) return low;
     if (at >= kCells) return high;

@@ -7,30 +7,15 @@
 #include <map>
 #include <numeric>
 
+#include "evpose/map_build/median.h"
+#include "evpose/map_build/moments.h"
+
 namespace evpose::map_build {
 namespace {
 
 constexpr double kFewestPoints = 40;  // of a plane, however small the patches
 constexpr double kInnerShare = 0.2;   // of a plane's points, that lie away from other planes
 constexpr double kBendNoise = 1.2;    // rms distance from the planes beside it, in units of the noise
-
-/// Sums of a region's points.
-struct Moments {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  double count = 0;
-
-  void add(const Eigen::Vector3d& x) {
-    sum += x;
-    squares += x * x.transpose();
-    count += 1;
-  }
-  void add(const Moments& other) {
-    sum += other.sum;
-    squares += other.squares;
-    count += other.count;
-  }
-};
 
 struct Fit {
   Eigen::Vector3d centre, normal;
@@ -41,18 +26,18 @@ struct Fit {
 
 Fit fit(const Moments& m) {
   Fit out;
-  out.centre = m.sum / m.count;
+  out.centre = m.mean();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.compute(m.squares / m.count - out.centre * out.centre.transpose());
+  solver.compute(m.covariance());
   out.values = solver.eigenvalues().cwiseMax(0);
   out.axes = solver.eigenvectors();
   out.normal = out.axes.col(0);
   return out;
 }
 
-class Growing {
+class RegionGrowing {
  public:
-  Growing(const SurfacePoints& surface, const PlaneConfig& config)
+  RegionGrowing(const SurfacePoints& surface, const PlaneConfig& config)
       : surface_(surface),
         config_(config),
         gate_m_(config.gate_sigma * surface.scale.noise_m),
@@ -62,9 +47,9 @@ class Growing {
 
   void grow_all();
   void dissolve_bends();
-  void merge_flush();
+  void merge_coplanar();
   void adopt_bends();
-  void share_out();
+  void relabel_to_nearest();
   void refit();
   Planes result();
 
@@ -74,6 +59,7 @@ class Growing {
     return &surface_.links[static_cast<std::size_t>(i) * SurfacePoints::kLinks];
   }
   void grow(std::uint32_t seed);
+  void renumber(const std::vector<std::int32_t>& part_of);
 
   const SurfacePoints& surface_;
   const PlaneConfig& config_;
@@ -85,7 +71,7 @@ class Growing {
   std::vector<std::uint32_t> region_;
 };
 
-void Growing::grow_all() {
+void RegionGrowing::grow_all() {
   std::vector<std::uint32_t> order(surface_.size());
   std::iota(order.begin(), order.end(), 0U);
   // The flattest half is enough to start from: every plane has points of it.
@@ -97,14 +83,14 @@ void Growing::grow_all() {
   for (auto& label : label_) label = std::max(label, -1);
 }
 
-void Growing::grow(std::uint32_t seed) {
+void RegionGrowing::grow(std::uint32_t seed) {
   const auto number = static_cast<std::int32_t>(moments_.size());
   // The first patch: the seed's plane through its neighbours' middle.
   Moments moments;
   moments.add(at(seed));
   for (int k = 0; k < SurfacePoints::kLinks; ++k) moments.add(at(links(seed)[k]));
   Fit plane;
-  plane.centre = moments.sum / moments.count;
+  plane.centre = moments.mean();
   plane.normal = surface_.normal[seed].cast<double>();
   moments = Moments();
   region_.assign(1, seed);
@@ -152,7 +138,7 @@ void Growing::grow(std::uint32_t seed) {
 
 /// A bend between two planes looks flat to patches that reach into both. What lies in the planes beside it,
 /// but for the noise, is no plane of its own.
-void Growing::dissolve_bends() {
+void RegionGrowing::dissolve_bends() {
   const std::size_t count = moments_.size();
   std::vector<std::vector<std::uint32_t>> members(count);
   for (std::uint32_t i = 0; i < label_.size(); ++i)
@@ -185,19 +171,28 @@ void Growing::dissolve_bends() {
     dissolved[region] = true;
     for (const std::uint32_t i : members[region]) label_[i] = -1;
   }
-  std::vector<std::int32_t> renumbered(count, -1);
+  std::vector<std::int32_t> kept(count);
+  for (std::size_t i = 0; i < count; ++i) kept[i] = dissolved[i] ? -1 : static_cast<std::int32_t>(i);
+  renumber(kept);
+}
+
+/// Keeps the regions that are part of themselves; `part_of` names the region that each one's points go to. No
+/// point may have a region that goes to none (-1).
+void RegionGrowing::renumber(const std::vector<std::int32_t>& part_of) {
+  std::vector<std::int32_t> number(part_of.size(), -1);
   std::vector<Moments> kept;
-  for (std::size_t i = 0; i < count; ++i)
-    if (!dissolved[i]) {
-      renumbered[i] = static_cast<std::int32_t>(kept.size());
+  for (std::size_t i = 0; i < part_of.size(); ++i)
+    if (part_of[i] == static_cast<std::int32_t>(i)) {
+      number[i] = static_cast<std::int32_t>(kept.size());
       kept.push_back(moments_[i]);
     }
   for (auto& label : label_)
-    if (label >= 0) label = renumbered[static_cast<std::size_t>(label)];
+    if (label >= 0) label = number[static_cast<std::size_t>(part_of[static_cast<std::size_t>(label)])];
   moments_ = std::move(kept);
 }
 
-void Growing::merge_flush() {
+/// Regions that touch and lie in one plane become one.
+void RegionGrowing::merge_coplanar() {
   // Largest first; a union of regions is fitted anew before the next is judged.
   const std::size_t count = moments_.size();
   std::vector<std::int32_t> parent(count);
@@ -229,10 +224,8 @@ void Growing::merge_flush() {
     // Each part must lie in the joint plane as well as in its own, but for a fraction of the noise.
     const double slack = 0.25 * surface_.scale.noise_m * surface_.scale.noise_m;
     const auto thickness = [&](const Moments& m) {
-      const Eigen::Vector3d mean = m.sum / m.count;
-      const Eigen::Matrix3d about = m.squares / m.count - mean * mean.transpose();
-      const double off = fab.distance(mean);
-      return fab.normal.dot(about * fab.normal) + off * off;
+      const double off = fab.distance(m.mean());
+      return fab.normal.dot(m.covariance() * fab.normal) + off * off;
     };
     const double angle_cos = std::abs(fa.normal.dot(fb.normal));
     const bool small = std::min(ma.count, mb.count) < 4 * least_points_;
@@ -241,20 +234,13 @@ void Growing::merge_flush() {
     ma = both;
     parent[static_cast<std::size_t>(b)] = a;
   }
-  std::vector<std::int32_t> renumbered(count, -1);
-  std::vector<Moments> kept;
-  for (std::size_t i = 0; i < count; ++i)
-    if (parent[i] == static_cast<std::int32_t>(i)) {
-      renumbered[i] = static_cast<std::int32_t>(kept.size());
-      kept.push_back(moments_[i]);
-    }
-  for (auto& label : label_)
-    if (label >= 0) label = renumbered[static_cast<std::size_t>(root(label))];
-  moments_ = std::move(kept);
+  std::vector<std::int32_t> roots(count);
+  for (std::size_t i = 0; i < count; ++i) roots[i] = root(static_cast<std::int32_t>(i));
+  renumber(roots);
 }
 
 /// Points beside a bend go to the nearer plane, whichever grew first.
-void Growing::share_out() {
+void RegionGrowing::relabel_to_nearest() {
   std::vector<Fit> planes;
   for (const Moments& m : moments_) planes.push_back(fit(m));
   std::vector<std::int32_t> nearest = label_;
@@ -273,7 +259,7 @@ void Growing::share_out() {
 
 /// Planes through the points that have only points of the same plane around them. Beside a bend the noise
 /// mixes the points of two faces, and faces of a pillar would lean by a degree.
-void Growing::refit() {
+void RegionGrowing::refit() {
   std::vector<Moments> all(moments_.size()), inner(moments_.size());
   for (std::uint32_t i = 0; i < label_.size(); ++i) {
     if (label_[i] < 0) continue;
@@ -290,35 +276,7 @@ void Growing::refit() {
   }
 }
 
-/// What the means of cells of a plane scatter beyond what their points' noise explains.
-double unevenness(const SurfacePoints& surface, const FittedPlane& plane) {
-  constexpr double kCellSpacings = 5;
-  constexpr double kFewestInCell = 8;
-  const double cell_m = kCellSpacings * plane.spacing_m;
-  if (!(cell_m > 0)) return 0;
-  const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
-  std::map<std::pair<int, int>, Eigen::Vector3d> cells;  // count, sum and squares of heights
-  for (const std::uint32_t i : plane.points) {
-    const Eigen::Vector3d x = surface.position[i].cast<double>() - plane.centre;
-    const double height = plane.normal.dot(x);
-    const auto key = std::pair(static_cast<int>(std::floor(u.dot(x) / cell_m)),
-                               static_cast<int>(std::floor(v.dot(x) / cell_m)));
-    auto [cell, is_new] = cells.try_emplace(key, Eigen::Vector3d::Zero());
-    cell->second += Eigen::Vector3d(1, height, height * height);
-  }
-  double scatter = 0, expected = 0, used = 0;
-  for (const auto& [key, sums] : cells) {
-    const double n = sums[0];
-    if (n < kFewestInCell) continue;
-    const double mean = sums[1] / n;
-    scatter += mean * mean;
-    expected += (sums[2] / n - mean * mean) / (n - 1);
-    used += 1;
-  }
-  return used > 0 ? std::sqrt(std::max(scatter - expected, 0.0) / used) : 0;
-}
-
-Planes Growing::result() {
+Planes RegionGrowing::result() {
   Planes out;
   out.label = label_;
   out.planes.resize(moments_.size());
@@ -342,17 +300,14 @@ Planes Growing::result() {
     const std::size_t step = std::max<std::size_t>(1, plane.points.size() / 1000);
     for (std::size_t i = 0; i < plane.points.size(); i += step)
       spacing.push_back(surface_.spacing_m[plane.points[i]]);
-    if (!spacing.empty()) {
-      std::nth_element(spacing.begin(), spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2),
-                       spacing.end());
-      plane.spacing_m = static_cast<double>(spacing[spacing.size() / 2]);
-    }
-    plane.uneven_m = unevenness(surface_, plane);
+    if (!spacing.empty()) plane.spacing_m = static_cast<double>(median(spacing));
+    plane.uneven_m = unevenness_m(surface_, plane);
   }
   return out;
 }
 
-void Growing::adopt_bends() {
+/// Points in the bends go to the nearest plane beside them.
+void RegionGrowing::adopt_bends() {
   std::vector<Fit> planes;
   for (const Moments& m : moments_) planes.push_back(fit(m));
   std::vector<std::pair<std::uint32_t, std::int32_t>> adopted;
@@ -380,25 +335,15 @@ void Growing::adopt_bends() {
 
 }  // namespace
 
-double FittedPlane::sigma_at(const Eigen::Vector3d& x) const {
-  const Eigen::Vector3d lever = x - centre;
-  return std::sqrt(offset_variance + lever.dot(tilt_covariance * lever));
-}
-
-double FittedPlane::tilt_sigma_rad() const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tilt_covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(solver.eigenvalues()[2], 0.0));
-}
-
 Planes find_planes(const SurfacePoints& surface, const PlaneConfig& config) {
-  Growing growing(surface, config);
+  RegionGrowing growing(surface, config);
   growing.grow_all();
   growing.dissolve_bends();
-  growing.merge_flush();
+  growing.merge_coplanar();
   growing.adopt_bends();
   for (int round = 0; round < 3; ++round) {
     growing.refit();
-    growing.share_out();
+    growing.relabel_to_nearest();
   }
   growing.refit();
   return growing.result();

@@ -18,7 +18,7 @@ constexpr double kLeastWidth_m = 0.04;
 constexpr double kWindow = 2.5;       // noise: half width of the window that follows the height
 constexpr double kFurthest = 4;       // noise: heights that are looked at to begin with
 constexpr double kOffPlane = 0.2;     // share of faces that leave their plane beside an edge
-constexpr double kOffPlane_m = 0.02;  // ... and by how much, 1 sigma
+constexpr double kOffPlane_m = 0.02;  // by how much such faces leave their plane, 1 sigma
 constexpr double kUneven = 0.1;       // noise: so far a surface may leave its plane unnoticed
 constexpr double kSpeaksAgainst = 3;  // sigma: from which on a slope is believed
 
@@ -41,8 +41,8 @@ double density(double x, double variance) {
 }
 
 /// Slope along the edge and what chunks scatter beyond their noise.
-void follow_slope(const std::vector<std::pair<double, double>>& points, double length, double noise_m,
-                  StripFit& out) {
+void fit_slope(const std::vector<std::pair<double, double>>& points, double length, double noise_m,
+               StripFit& out) {
   constexpr int kChunkPoints = 12, kMostChunks = 64;
   const int chunks = std::clamp(static_cast<int>(points.size()) / kChunkPoints, 1, kMostChunks);
   std::vector<Eigen::Vector3d> sums(static_cast<std::size_t>(chunks), Eigen::Vector3d::Zero());
@@ -90,22 +90,9 @@ std::vector<Eigen::Vector3d> points_around(const SurfacePoints& surface, const N
                                            const Eigen::Vector3d& begin, const Eigen::Vector3d& end,
                                            double reach_m) {
   std::vector<Eigen::Vector3d> out;
-  const double length = (end - begin).norm();
-  const Eigen::Vector3d along = (end - begin) / length;
-  // Balls in a row; each gives the points of its own share of the line.
-  const int balls = std::max(1, static_cast<int>(std::ceil(length / reach_m)));
-  const double half = 0.5 * length / balls;
-  const auto radius = static_cast<float>(std::hypot(half, reach_m));
-  std::vector<std::uint32_t> near;
-  for (int k = 0; k < balls; ++k) {
-    const Eigen::Vector3d centre = begin + (2 * k + 1) * half * along;
-    tree.within(centre.cast<float>(), radius, near);
-    for (const std::uint32_t i : near) {
-      const Eigen::Vector3d x = surface.position[i].cast<double>();
-      const double t = along.dot(x - centre);
-      if (t >= -half && t < half && (x - centre - t * along).norm() <= reach_m) out.push_back(x);
-    }
-  }
+  for_points_along(surface, tree, begin, end, reach_m, [&](std::uint32_t i, const auto&, const auto& off) {
+    if (off.norm() <= reach_m) out.push_back(surface.position[i].cast<double>());
+  });
   return out;
 }
 
@@ -143,21 +130,15 @@ StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace&
   out.offset_m = share * height + (1 - share) * at_plane;
   out.sigma_m = std::sqrt(share * own + (1 - share) * at_plane_variance +
                           share * (1 - share) * (height - at_plane) * (height - at_plane));
-  follow_slope(points, length, noise_m, out);
+  fit_slope(points, length, noise_m, out);
   return out;
 }
 
-bool stands_before(const Neighbours& tree, const Piece& crease, double reach_a_m, double reach_b_m) {
+bool stands_before(const Neighbours& tree, const LineSegment& crease, double reach_a_m, double reach_b_m) {
   constexpr int kProbes = 3;
   constexpr double kSteep = 0.3;     // normal's share along z of what stands upright, at most
   constexpr double kBeyond_m = 0.1;  // past the crease's end and beside it, where a wall may go on
   const Eigen::Vector3d along = crease.tangent();
-  const auto has_points = [&](const Eigen::Vector3d& x, double reach) {
-    std::uint32_t index = 0;
-    float square = 0;
-    return tree.nearest(x.cast<float>(), {&index, 1}, {&square, 1}) == 1 &&
-           std::sqrt(static_cast<double>(square)) < reach;
-  };
   for (const Eigen::Vector3d& across : {crease.normal_a, crease.normal_b})
     if (std::abs(along.cross(across).z()) > kSteep) return false;
   for (const auto& [across, reach] :
@@ -167,7 +148,7 @@ bool stands_before(const Neighbours& tree, const Piece& crease, double reach_a_m
       for (int k = 1; k <= kProbes; ++k) {
         const Eigen::Vector3d past = (end > 0 ? crease.end : crease.begin) + end * k * kBeyond_m * along;
         for (const int s : {0, 1})
-          sides[s] += has_points(past + (2 * s - 1) * kBeyond_m * across, reach) ? 1 : 0;
+          sides[s] += tree.any_within(past + (2 * s - 1) * kBeyond_m * across, reach) ? 1 : 0;
       }
       if (std::min(sides[0], sides[1]) == kProbes) return true;
     }

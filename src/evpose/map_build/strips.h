@@ -2,14 +2,38 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <vector>
 
-#include "evpose/map_build/piece.h"
+#include "evpose/map_build/line_segment.h"
+#include "evpose/map_build/neighbours.h"
 #include "evpose/map_build/planes.h"
 
 namespace evpose::map_build {
 
-class Neighbours;
+/// Calls visit(number, d, off) for the points around a line and a few more: `d` from a place on the line
+/// nearby, `off` from the line itself. Looks into balls in a row, each for its own share of the line.
+template <class Visit>
+void for_points_along(const SurfacePoints& surface, const Neighbours& tree, const Eigen::Vector3d& begin,
+                      const Eigen::Vector3d& end, double reach_m, const Visit& visit) {
+  const double length = (end - begin).norm();
+  const Eigen::Vector3d along = (end - begin) / length;
+  const int balls = std::max(1, static_cast<int>(std::ceil(length / reach_m)));
+  const double half = 0.5 * length / balls;
+  const auto radius = static_cast<float>(std::hypot(half, reach_m));
+  std::vector<std::uint32_t> near;
+  for (int k = 0; k < balls; ++k) {
+    const Eigen::Vector3d centre = begin + (2 * k + 1) * half * along;
+    tree.within(centre.cast<float>(), radius, near);
+    for (const std::uint32_t i : near) {
+      const Eigen::Vector3d d = surface.position[i].cast<double>() - centre;
+      const double t = along.dot(d);
+      if (t >= -half && t < half) visit(i, d, Eigen::Vector3d(d - t * along));
+    }
+  }
+}
 
 /// All points of the cloud within `reach_m` of a line, whatever plane they are of, relative to the anchor.
 std::vector<Eigen::Vector3d> points_around(const SurfacePoints& surface, const Neighbours& tree,
@@ -45,6 +69,6 @@ StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace&
 /// Two upright faces, and past an end of the crease one of them goes on to both sides: furniture stands
 /// before a wall. Whether it touches the wall is open, and a gap of 2 cm has another edge. Reaches: how far a
 /// point of each face may be from where the face is.
-bool stands_before(const Neighbours& tree, const Piece& crease, double reach_a_m, double reach_b_m);
+bool stands_before(const Neighbours& tree, const LineSegment& crease, double reach_a_m, double reach_b_m);
 
 }  // namespace evpose::map_build

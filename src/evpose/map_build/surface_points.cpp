@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "evpose/core/parallel.h"
+#include "evpose/map_build/median.h"
+#include "evpose/map_build/moments.h"
 #include "evpose/map_build/neighbours.h"
 
 namespace evpose::map_build {
@@ -17,28 +19,11 @@ constexpr int kLargestSamplePatch = 1000;  // points
 constexpr double kFlat = 0.1;              // thickness^2 over width^2 of a patch that counts as flat
 constexpr std::size_t kFewest = 50;        // points of a cloud
 
-/// Sums over a growing patch, relative to its middle point.
-struct Moments {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  int count = 0;
-
-  void add(const Eigen::Vector3d& p) {
-    sum += p;
-    squares += p * p.transpose();
-    ++count;
-  }
-  Eigen::Matrix3d covariance() const {
-    const Eigen::Vector3d mean = sum / count;
-    return squares / count - mean * mean.transpose();
-  }
-};
-
 struct Shape {
   Eigen::Vector3d values = Eigen::Vector3d::Zero();  ///< ascending
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   /// Square of the normal's error if what makes the patch thick is noise.
-  double normal_variance(int count) const {
+  double normal_variance(double count) const {
     return values[1] > 0 ? std::max(values[0], 0.0) / (values[1] * count) : 1;
   }
 };
@@ -51,12 +36,6 @@ Shape shape_of(const Moments& moments) {
 
 double spacing_of(double radius_squared, std::size_t count) {
   return std::sqrt(std::numbers::pi * radius_squared / static_cast<double>(count));
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -74,7 +53,7 @@ Expected<CloudScale> measure_scale(const std::vector<Eigen::Vector3f>& points, c
   const std::size_t step = std::max<std::size_t>(1, points.size() / kSample);
   for (std::size_t i = 0; i < points.size(); i += step, ++looked) {
     const std::size_t found = tree.nearest(points[i], near, squares);
-    Moments moments;
+    Moments moments;  // relative to the patch's middle point
     bool line = true;
     for (std::size_t k = 0; k < found; ++k) {
       moments.add((points[near[k]] - points[i]).cast<double>());
@@ -137,7 +116,7 @@ SurfacePoints describe_surface(std::vector<Eigen::Vector3f>&& points, const Neig
       for (std::size_t k = 0; k < found && linked < SurfacePoints::kLinks; ++k)
         if (near[k] != i) links[linked++] = near[k];
       while (linked < SurfacePoints::kLinks) links[linked++] = static_cast<std::uint32_t>(i);
-      Moments moments;
+      Moments moments;  // relative to the patch's middle point
       int next = std::max(config.least, scale.neighbours / 2);
       for (std::size_t k = 0; k < found; ++k) {
         if (k + 1 == usual && found == usual && near.size() > usual)
@@ -150,7 +129,7 @@ SurfacePoints describe_surface(std::vector<Eigen::Vector3f>&& points, const Neig
         out.curvature[i] = sum > 0 ? static_cast<float>(std::max(shape.values[0], 0.0) / sum) : 1.0F / 3;
         out.spacing_m[i] = static_cast<float>(spacing_of(static_cast<double>(squares[k]), k + 1));
         if (shape.normal_variance(moments.count) <= enough) break;
-        next = moments.count * 3 / 2;
+        next = static_cast<int>(moments.count) * 3 / 2;
       }
     }
   });

@@ -8,6 +8,7 @@
 
 #include "evpose/core/parallel.h"
 #include "evpose/map_build/map_builder.h"
+#include "evpose/map_build/neighbours.h"
 
 namespace evpose::map_build {
 
@@ -61,6 +62,22 @@ class Scan {
   std::mt19937 random_;
   PointCloud cloud_;
 };
+
+/// Floor and two walls that meet at the origin, turned so that nothing lies along an axis.
+inline PointCloud room_corner(unsigned seed) {
+  Scan scan(seed);
+  scan.rectangle({0, 0, 0}, {1.5, 0, 0}, {0, 1.2, 0});
+  scan.rectangle({0, 0, 0}, {0, 1.2, 0}, {0, 0, 1});
+  scan.rectangle({0, 0, 0}, {0, 0, 1}, {1.5, 0, 0});
+  return scan.cloud();
+}
+
+inline SurfacePoints described(std::vector<Eigen::Vector3f> points) {
+  ThreadPool pool(2);
+  const Neighbours tree(points);
+  const auto scale = measure_scale(points, tree, {}, "scan");
+  return describe_surface(std::move(points), tree, *scale, {}, pool);
+}
 
 inline Expected<BuiltMap> build(const PointCloud& cloud, int threads = 1) {
   ThreadPool pool(threads);

@@ -13,8 +13,8 @@ namespace {
 constexpr std::size_t kSample = 200'000;  // points that tell where to cut
 constexpr double kLeastSide_m = 5;  // narrower tiles are not halved: their overlaps would be most of them
 
-void cut(std::vector<Eigen::Vector2f>& sample, std::size_t begin, std::size_t end, double most,
-         const Tile& tile, std::vector<Tile>& out) {
+void halve(std::vector<Eigen::Vector2f>& sample, std::size_t begin, std::size_t end, double most,
+           const Tile& tile, std::vector<Tile>& out) {
   const auto count = end - begin;
   Eigen::Vector2f low = count > 0 ? sample[begin] : Eigen::Vector2f::Zero(), high = low;
   for (std::size_t i = begin; i < end; ++i) low = low.cwiseMin(sample[i]), high = high.cwiseMax(sample[i]);
@@ -37,12 +37,12 @@ void cut(std::vector<Eigen::Vector2f>& sample, std::size_t begin, std::size_t en
   const auto split = static_cast<std::size_t>(beyond - sample.begin());
   Tile first = tile, second = tile;
   first.high[axis] = second.low[axis] = at;
-  cut(sample, begin, split, most, first, out);
-  cut(sample, split, end, most, second, out);
+  halve(sample, begin, split, most, first, out);
+  halve(sample, split, end, most, second, out);
 }
 
 /// Every third bit of the result is one of the lower 21 of v.
-std::uint64_t spread_bits(std::uint64_t v) {
+std::uint64_t interleaved_with_zeros(std::uint64_t v) {
   v &= 0x1FFFFF;
   v = (v | v << 32) & 0x1F00000000FFFF;
   v = (v | v << 16) & 0x1F0000FF0000FF;
@@ -53,7 +53,7 @@ std::uint64_t spread_bits(std::uint64_t v) {
 
 }  // namespace
 
-std::size_t put_in_order(PointCloud& cloud) {
+std::size_t sort_and_deduplicate(PointCloud& cloud) {
   constexpr float kCell_m = 0.05F;
   struct Place {
     std::uint64_t key;  ///< along a Z-curve
@@ -66,7 +66,7 @@ std::size_t put_in_order(PointCloud& cloud) {
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     const Eigen::Vector3f cell = (cloud.points[i] - low) / kCell_m;
     const auto bits = [&](Eigen::Index k) {
-      return spread_bits(static_cast<std::uint64_t>(std::min(cell[k], 2'000'000.0F)));
+      return interleaved_with_zeros(static_cast<std::uint64_t>(std::min(cell[k], 2'000'000.0F)));
     };
     order[i] = {bits(0) | bits(1) << 1 | bits(2) << 2, i};
   }
@@ -101,11 +101,11 @@ std::vector<Tile> cut_into_tiles(const std::vector<Eigen::Vector3f>& points, dou
   std::vector<Eigen::Vector2f> sample;
   for (std::size_t i = 0; i < points.size(); i += step) sample.push_back(points[i].head<2>());
   std::vector<Tile> out;
-  cut(sample, 0, sample.size(), most_points / static_cast<double>(step), all, out);
+  halve(sample, 0, sample.size(), most_points / static_cast<double>(step), all, out);
   return out;
 }
 
-PointCloud part_of(const PointCloud& cloud, const Tile& tile) {
+PointCloud points_seen_by(const PointCloud& cloud, const Tile& tile) {
   PointCloud out;
   out.anchor = cloud.anchor;
   out.source = cloud.source;
@@ -117,10 +117,10 @@ PointCloud part_of(const PointCloud& cloud, const Tile& tile) {
   return out;
 }
 
-std::optional<Piece> clipped(const Piece& piece, const Tile& tile) {
+std::optional<LineSegment> clipped(const LineSegment& segment, const Tile& tile) {
   double first = 0, last = 1;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
-    const double from = piece.begin[axis], way = piece.end[axis] - from;
+    const double from = segment.begin[axis], way = segment.end[axis] - from;
     const auto low = static_cast<double>(tile.low[axis]), high = static_cast<double>(tile.high[axis]);
     if (way == 0) {
       if (from < low || from >= high) return std::nullopt;
@@ -131,9 +131,9 @@ std::optional<Piece> clipped(const Piece& piece, const Tile& tile) {
     last = std::min(last, std::max(to_low, to_high));
   }
   if (!(first < last)) return std::nullopt;
-  Piece out = piece;
-  out.begin = piece.begin + first * (piece.end - piece.begin);
-  out.end = piece.begin + last * (piece.end - piece.begin);
+  LineSegment out = segment;
+  out.begin = segment.begin + first * (segment.end - segment.begin);
+  out.end = segment.begin + last * (segment.end - segment.begin);
   return out;
 }
 

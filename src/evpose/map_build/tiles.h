@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "evpose/map_build/piece.h"
+#include "evpose/map_build/line_segment.h"
 
 namespace evpose {
 struct PointCloud;
@@ -32,12 +32,12 @@ std::vector<Tile> cut_into_tiles(const std::vector<Eigen::Vector3f>& points, dou
 
 /// Sorts points so that neighbours in space are neighbours in memory, whatever order they came in, and drops
 /// those at exactly the same place as another: they say the same. Returns how many were dropped.
-std::size_t put_in_order(PointCloud& cloud);
+std::size_t sort_and_deduplicate(PointCloud& cloud);
 
 /// The points that a tile sees, in their order.
-PointCloud part_of(const PointCloud& cloud, const Tile& tile);
+PointCloud points_seen_by(const PointCloud& cloud, const Tile& tile);
 
-/// The part of a piece that lies in a tile's core.
-std::optional<Piece> clipped(const Piece& piece, const Tile& tile);
+/// The part of a segment that lies in a tile's core.
+std::optional<LineSegment> clipped(const LineSegment& segment, const Tile& tile);
 
 }  // namespace evpose::map_build

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/map_build/section_fit.h"
+#include "evpose/map_build/edge_profile_fit.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -17,6 +17,7 @@ constexpr int kGeometry = 4;  // place, slope, height, depth
 constexpr int kSurfaces = 5;  // plane, face, under, beyond, rest
 constexpr int kFirstRounds = 10, kMostRounds = 40;
 constexpr double kFirstGain = 0.1, kNoGain = 1e-3;  // of log likelihood: rounds that gain less are the last
+constexpr std::size_t kFewestPoints = 20;           // in a window
 constexpr std::size_t kFirstPoints = 400, kMostPoints = 1200;  // first: to choose a start and a blur
 constexpr double kLeastDepthNoise = 0.6;                       // shallower faces are none
 
@@ -42,12 +43,12 @@ struct State {
   Densities density{};
 };
 
-class Section {
+class EdgeProfile {
  public:
-  Section(std::span<const Eigen::Vector3d> points, const SectionWindow& window)
+  EdgeProfile(std::span<const Eigen::Vector3d> points, const EdgeProfileWindow& window)
       : points_(points), window_(window) {}
 
-  State started(int side, bool ends, double depth, const Blur& blur) const;
+  State initial_state(int side, bool ends, double depth, const Blur& blur) const;
   double log_likelihood(const State& s) const;
   double improve(State& s, int rounds, double no_gain) const;
   Matrix information(const State& s, Vector* gradient, Densities* shares) const;
@@ -62,10 +63,10 @@ class Section {
   Shapes integrals(const State& s) const;
 
   std::span<const Eigen::Vector3d> points_;
-  SectionWindow window_;
+  EdgeProfileWindow window_;
 };
 
-void Section::shapes(const State& s, const Eigen::Vector3d& p, Shapes& out, bool with_slopes) const {
+void EdgeProfile::shapes(const State& s, const Eigen::Vector3d& p, Shapes& out, bool with_slopes) const {
   const Normal& n = normal();
   const Blur& blur = s.blur;
   const double edge = s.geometry[0] + s.geometry[1] * p.x(), height = s.geometry[2];
@@ -107,7 +108,7 @@ void Section::shapes(const State& s, const Eigen::Vector3d& p, Shapes& out, bool
   out.slope[3] = {-end.at_end * end.on, beyond, s.side * beyond};
 }
 
-Section::Shapes Section::integrals(const State& s) const {
+EdgeProfile::Shapes EdgeProfile::integrals(const State& s) const {
   const Normal& n = normal();
   const double across = s.blur.across_m, up = s.blur.up_m, length = 2 * window_.half_length;
   const double edge = s.geometry[0], width = window_.half_width, high = window_.half_height;
@@ -134,7 +135,7 @@ Section::Shapes Section::integrals(const State& s) const {
   return out;
 }
 
-State Section::started(int side, bool ends, double depth, const Blur& blur) const {
+State EdgeProfile::initial_state(int side, bool ends, double depth, const Blur& blur) const {
   State s;
   s.blur = blur;
   s.side = side;
@@ -147,7 +148,7 @@ State Section::started(int side, bool ends, double depth, const Blur& blur) cons
   return s;
 }
 
-double Section::log_likelihood(const State& s) const {
+double EdgeProfile::log_likelihood(const State& s) const {
   const Shapes whole = integrals(s);
   double sum = -0.5 * std::pow(s.geometry[2] / window_.sigma_height_m, 2);
   for (std::size_t k = 0; k < kSurfaces; ++k) sum -= s.density[k] * whole.value[k];
@@ -161,7 +162,7 @@ double Section::log_likelihood(const State& s) const {
   return sum;
 }
 
-Matrix Section::information(const State& s, Vector* gradient, Densities* shares) const {
+Matrix EdgeProfile::information(const State& s, Vector* gradient, Densities* shares) const {
   const Shapes whole = integrals(s);
   Matrix out = Matrix::Zero();
   Vector uphill = Vector::Zero();
@@ -197,7 +198,7 @@ Matrix Section::information(const State& s, Vector* gradient, Densities* shares)
 }
 
 /// Rounds of expectation (densities) and Fisher scoring (geometry), only uphill.
-double Section::improve(State& s, int rounds, double no_gain) const {
+double EdgeProfile::improve(State& s, int rounds, double no_gain) const {
   double likelihood = log_likelihood(s);
   const double noise = window_.noise_m;
   for (int round = 0; round < rounds; ++round) {
@@ -236,26 +237,7 @@ double Section::improve(State& s, int rounds, double no_gain) const {
   return likelihood;
 }
 
-}  // namespace
-
-SectionWindow section_window(double half_length, double noise_m, double rms_m, double spacing_m) {
-  constexpr double kReach = 3;         // noise
-  constexpr double kBand_m = 0.03;     // beyond that, for faces to be seen in, at least ...
-  constexpr double kBandSpacings = 2;  // ... and in spacings
-  constexpr double kOffPlane = 0.4;    // noise: so far a plane may lie off its surface at an edge
-  SectionWindow out{};
-  out.half_length = half_length;
-  out.half_width = kReach * noise_m + kBand_m;
-  out.half_height = kReach * noise_m + std::max(kBand_m, kBandSpacings * spacing_m);
-  out.noise_m = noise_m;
-  out.height_noise_m = std::clamp(rms_m, 0.3 * noise_m, 1.5 * noise_m);
-  out.sigma_height_m = kOffPlane * noise_m;
-  return out;
-}
-
-namespace {
-
-/// Every so-manieth point, so that there are no more than `most`.
+/// Every n-th point, so that there are no more than `most`.
 std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points, std::size_t most) {
   if (points.size() <= most) return points;
   std::vector<Eigen::Vector3d> out;
@@ -264,62 +246,75 @@ std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points,
   return out;
 }
 
-}  // namespace
+struct Tried {
+  State state;
+  double log_likelihood;
+};
 
-SectionFit fit_section(std::span<const Eigen::Vector3d> all, const SectionWindow& window) {
-  std::vector<Eigen::Vector3d> points;
-  for (const auto& p : all)
-    if (std::abs(p.y()) <= window.half_width && std::abs(p.z()) <= window.half_height) points.push_back(p);
-  points = thinned(points, kMostPoints);
-  SectionFit out;
-  if (points.size() < 20) return out;
-  const std::vector<Eigen::Vector3d> some = thinned(points, kFirstPoints);
-  const Section section(points, window), first(some, window);
-  struct Tried {
-    State state;
-    double log_likelihood;
-  };
-  const auto likelier = [](const Tried& a, const Tried& b) { return a.log_likelihood < b.log_likelihood; };
-  const auto improved = [&](State state) {
-    const double likelihood = first.improve(state, kFirstRounds, kFirstGain);
-    return Tried{state, likelihood};
-  };
-  const Blur even{window.noise_m, window.height_noise_m, 0};
+/// Fits to some of the points, to choose a start and a blur.
+class Starts {
+ public:
+  Starts(std::span<const Eigen::Vector3d> some, const EdgeProfileWindow& window)
+      : window_(window), profile_(some, window), even_{window.noise_m, window.height_noise_m, 0} {}
+
+  Tried without_face() const { return improved(profile_.initial_state(0, false, 0, even_)); }
+  Tried likeliest_face() const;
+  /// Tries blurs of other widths, and such that lean with the height.
+  void refine_blur(Tried& best) const;
+
+ private:
+  Tried improved(State state) const {
+    const double likelihood = profile_.improve(state, kFirstRounds, kFirstGain);
+    return {state, likelihood};
+  }
+  void try_blur(Tried& best, double across_m, double correlation) const;
+
+  EdgeProfileWindow window_;
+  EdgeProfile profile_;
+  Blur even_;
+};
+
+Tried Starts::likeliest_face() const {
   std::vector<Tried> faces;
   for (const int side : {-1, 1}) {
-    faces.push_back(improved(first.started(side, false, window.half_height, even)));
-    faces.push_back(improved(first.started(side, true, 1.5 * window.noise_m, even)));
-    faces.push_back(improved(first.started(side, true, 0.55 * window.half_height, even)));
+    faces.push_back(improved(profile_.initial_state(side, false, window_.half_height, even_)));
+    faces.push_back(improved(profile_.initial_state(side, true, 1.5 * window_.noise_m, even_)));
+    faces.push_back(improved(profile_.initial_state(side, true, 0.55 * window_.half_height, even_)));
   }
-  std::array<Tried, 2> tried = {improved(first.started(0, false, 0, even)),
-                                *std::max_element(faces.begin(), faces.end(), likelier)};
-  for (Tried& best : tried) {
-    const auto blurred = [&](double across_m, double correlation) {
-      State state = best.state;
-      state.blur = {across_m, window.height_noise_m, correlation};
-      const Tried now = improved(state);
-      return now.log_likelihood > best.log_likelihood ? now : best;
-    };
-    for (const double across : {0.35, 0.7, 1.4}) best = blurred(across * window.noise_m, 0);
-    for (const double correlation : {-0.6, 0.6}) best = blurred(best.state.blur.across_m, correlation);
-    const Blur rough = best.state.blur;
-    const auto wider = [&](double share, double correlation) {
-      return blurred(std::min(share * rough.across_m, 1.4 * window.noise_m), correlation);
-    };
-    for (const double share : {0.7, 1.4}) best = wider(share, rough.correlation);
-    // Of one ray they go together but for rounding, of rays from all sides not at all.
-    if (rough.correlation != 0)
-      for (const double share : {0.7, 0.85, 1.0, 1.2, 1.4})
-        best = wider(share, std::copysign(0.97, rough.correlation));
-    for (double& density : best.state.density)
-      density *= static_cast<double>(points.size()) / static_cast<double>(some.size());
-    best.log_likelihood = section.improve(best.state, kMostRounds, kNoGain);
-  }
-  const double gain = tried[1].log_likelihood - tried[0].log_likelihood;
-  const State& s = tried[gain > 0 ? 1 : 0].state;
+  return *std::max_element(faces.begin(), faces.end(), [](const Tried& a, const Tried& b) {
+    return a.log_likelihood < b.log_likelihood;
+  });
+}
+
+void Starts::try_blur(Tried& best, double across_m, double correlation) const {
+  State state = best.state;
+  state.blur = {across_m, window_.height_noise_m, correlation};
+  const Tried now = improved(state);
+  if (now.log_likelihood > best.log_likelihood) best = now;
+}
+
+void Starts::refine_blur(Tried& best) const {
+  for (const double across : {0.35, 0.7, 1.4}) try_blur(best, across * window_.noise_m, 0);
+  for (const double correlation : {-0.6, 0.6}) try_blur(best, best.state.blur.across_m, correlation);
+  const Blur rough = best.state.blur;
+  const auto try_width = [&](double share, double correlation) {
+    try_blur(best, std::min(share * rough.across_m, 1.4 * window_.noise_m), correlation);
+  };
+  for (const double share : {0.7, 1.4}) try_width(share, rough.correlation);
+  // Of one ray they go together but for rounding, of rays from all sides not at all.
+  if (rough.correlation != 0)
+    for (const double share : {0.7, 0.85, 1.0, 1.2, 1.4})
+      try_width(share, std::copysign(0.97, rough.correlation));
+}
+
+/// `gain`: of log likelihood over a plane without a second face.
+EdgeProfileFit as_fit(const EdgeProfile& profile, const Tried& best, double gain, std::size_t points,
+                      const EdgeProfileWindow& window) {
+  const State& s = best.state;
   Vector gradient;
   Densities shares;
-  const Matrix covariance = section.information(s, &gradient, &shares).inverse();
+  const Matrix covariance = profile.information(s, &gradient, &shares).inverse();
+  EdgeProfileFit out;
   out.place = s.geometry[0];
   out.slope = s.geometry[1];
   out.height = s.geometry[2];
@@ -334,12 +329,49 @@ SectionFit fit_section(std::span<const Eigen::Vector3d> all, const SectionWindow
   out.sigma_place = std::sqrt(std::max(covariance(0, 0), 0.0));
   out.sigma_height = std::sqrt(std::max(covariance(2, 2), 0.0));
   out.sigma_depth = std::sqrt(std::max(covariance(3, 3), 0.0));
-  out.log_likelihood = tried[gain > 0 ? 1 : 0].log_likelihood;
+  out.log_likelihood = best.log_likelihood;
   out.gain = std::max(gain, 0.0);
   out.across_m = s.blur.across_m;
   out.correlation = s.blur.correlation;
-  out.rest_share = shares[4] / static_cast<double>(points.size());
+  out.rest_share = shares[4] / static_cast<double>(points);
   return out;
+}
+
+}  // namespace
+
+EdgeProfileWindow edge_profile_window(double half_length, double noise_m, double rms_m, double spacing_m) {
+  constexpr double kReach = 3;         // noise
+  constexpr double kBand_m = 0.03;     // beyond that, for faces to be seen in, at least
+  constexpr double kBandSpacings = 2;  // spacings: the same, where that is more
+  constexpr double kOffPlane = 0.4;    // noise: so far a plane may lie off its surface at an edge
+  EdgeProfileWindow out{};
+  out.half_length = half_length;
+  out.half_width = kReach * noise_m + kBand_m;
+  out.half_height = kReach * noise_m + std::max(kBand_m, kBandSpacings * spacing_m);
+  out.noise_m = noise_m;
+  out.height_noise_m = std::clamp(rms_m, 0.3 * noise_m, 1.5 * noise_m);
+  out.sigma_height_m = kOffPlane * noise_m;
+  return out;
+}
+
+EdgeProfileFit fit_edge_profile(std::span<const Eigen::Vector3d> all, const EdgeProfileWindow& window) {
+  std::vector<Eigen::Vector3d> points;
+  for (const auto& p : all)
+    if (std::abs(p.y()) <= window.half_width && std::abs(p.z()) <= window.half_height) points.push_back(p);
+  points = thinned(points, kMostPoints);
+  if (points.size() < kFewestPoints) return {};
+  const std::vector<Eigen::Vector3d> some = thinned(points, kFirstPoints);
+  const EdgeProfile profile(points, window);
+  const Starts starts(some, window);
+  std::array<Tried, 2> tried = {starts.without_face(), starts.likeliest_face()};
+  for (Tried& best : tried) {
+    starts.refine_blur(best);
+    for (double& density : best.state.density)
+      density *= static_cast<double>(points.size()) / static_cast<double>(some.size());
+    best.log_likelihood = profile.improve(best.state, kMostRounds, kNoGain);
+  }
+  const double gain = tried[1].log_likelihood - tried[0].log_likelihood;
+  return as_fit(profile, tried[gain > 0 ? 1 : 0], gain, points.size(), window);
 }
 
 }  // namespace evpose::map_build

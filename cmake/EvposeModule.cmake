@@ -11,9 +11,13 @@ function(evpose_module name)
   target_compile_features(evpose_${name} PUBLIC cxx_std_20)
   set_target_properties(evpose_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON EXPORT_NAME ${name})
   set_property(GLOBAL APPEND PROPERTY EVPOSE_MODULES ${name})
+  evpose_precompile(evpose_${name} evpose_precompiled)
+  evpose_unity(evpose_${name})
   if(EVPOSE_TESTS AND ARG_TESTS)
     add_executable(evpose_${name}_test ${ARG_TESTS})
     target_link_libraries(evpose_${name}_test PRIVATE evpose_${name} evpose_options GTest::gtest_main)
+    evpose_precompile(evpose_${name}_test evpose_precompiled_test)
+    evpose_unity(evpose_${name}_test)
     gtest_discover_tests(evpose_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
                          PROPERTIES TIMEOUT 300 LABELS unit)
   endif()
@@ -49,3 +53,44 @@ add_library(evpose_eigen INTERFACE)
 target_link_libraries(evpose_eigen INTERFACE Eigen3::Eigen)
 target_compile_definitions(evpose_eigen INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
 set_target_properties(evpose_eigen PROPERTIES EXPORT_NAME eigen)
+
+# Precompiled headers: outside headers that nearly every source includes. Headers of the project are not among them: a
+# change to one would rebuild everything. A source still includes all that it uses. GCC takes no headers that were
+# compiled with other options, hence a set for the modules (position-independent), one for their tests and one for all
+# other programs.
+set(precompiled_headers
+  <Eigen/Cholesky> <Eigen/Core> <Eigen/Eigenvalues> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <charconv>
+  <chrono> <cmath> <cstdint> <cstdio> <cstring> <deque> <filesystem> <fstream> <functional> <limits> <map> <memory>
+  <mutex> <numbers> <numeric> <optional> <random> <set> <span> <sstream> <stdexcept> <string> <string_view> <thread>
+  <tuple> <unordered_map> <utility> <variant> <vector>)
+
+# evpose_precompiled_headers(NAME [HEADER...] [LIBRARIES ...]): these, which come with the libraries, and the common ones,
+# for targets to use by evpose_precompile.
+function(evpose_precompiled_headers name)
+  if(NOT EVPOSE_PRECOMPILED)
+    return()
+  endif()
+  cmake_parse_arguments(ARG "" "" LIBRARIES ${ARGN})
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  file(CONFIGURE OUTPUT ${source} CONTENT "")
+  add_library(${name} OBJECT EXCLUDE_FROM_ALL ${source})
+  target_link_libraries(${name} PRIVATE evpose_options evpose_eigen ${ARG_LIBRARIES})
+  target_precompile_headers(${name} PRIVATE ${precompiled_headers} ${ARG_UNPARSED_ARGUMENTS})
+endfunction()
+
+function(evpose_precompile target headers)
+  if(EVPOSE_PRECOMPILED)
+    target_precompile_headers(${target} REUSE_FROM ${headers})
+  endif()
+endfunction()
+
+evpose_precompiled_headers(evpose_precompiled)
+if(EVPOSE_PRECOMPILED)
+  set_target_properties(evpose_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)
+endif()
+if(NOT EVPOSE_ONLY)
+  evpose_precompiled_headers(evpose_precompiled_program <CLI/CLI.hpp> LIBRARIES CLI11::CLI11)
+endif()
+if(EVPOSE_TESTS)
+  evpose_precompiled_headers(evpose_precompiled_test <gtest/gtest.h> LIBRARIES GTest::gtest)
+endif()

@@ -44,7 +44,11 @@ def arguments(entry):
     command = shlex.split(entry["command"])
     if os.path.basename(command[0]) == "ccache":
         command = command[1:]
-    return command[:command.index("-o")]
+    command = command[:command.index("-o")]
+    if "-include" in command:  # headers precompiled by GCC, which clang cannot read
+        at = command.index("-include")
+        del command[at:at + 2]
+    return command
 
 
 def types(names):

@@ -93,7 +93,11 @@ Preintegration::Residual Preintegration::residual(const FusionState& i, const Fu
       so3::log(inc.dq.conjugate() * i.nav.T_map_body.q.conjugate() * j.nav.T_map_body.q);
 
   Residual r;
-  r.value << moved - inc.dp, turned, gained - inc.dv, j.gyro_bias - i.gyro_bias, j.accel_bias - i.accel_bias;
+  r.value.segment<3>(kP) = moved - inc.dp;
+  r.value.segment<3>(kPhi) = turned;
+  r.value.segment<3>(kV) = gained - inc.dv;
+  r.value.segment<3>(kBg) = j.gyro_bias - i.gyro_bias;
+  r.value.segment<3>(kBa) = j.accel_bias - i.accel_bias;
   r.by_start.setZero();
   r.by_end.setIdentity();
   const Eigen::Matrix3d by_turn = so3::right_jacobian_inverse(turned);

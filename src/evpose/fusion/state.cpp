@@ -37,7 +37,8 @@ PoseInformation linearised(std::span<const ContourOffset> contours, const Pose& 
   for (const ContourOffset& c : contours) {
     const Eigen::Vector3d point = T_at_measured * c.point_body;
     Vector6d J;
-    J << R * c.across_body, point.cross(c.across_body);
+    J.head<3>() = R * c.across_body;
+    J.tail<3>() = point.cross(c.across_body);
     const double rest = c.offset_px + c.across_body.dot(point - c.point_body);
     out.information.selfadjointView<Eigen::Lower>().rankUpdate(J, c.weight);
     out.vector += c.weight * rest * J;

@@ -42,7 +42,8 @@ ViewAccuracy expected_accuracy(const ContourMap& map, std::span<const std::uint3
     const Eigen::Vector2d across = Eigen::Vector2d(-along.y(), along.x()).normalized();
     const Eigen::RowVector3d a = across.transpose() * jacobian;
     Vector6d j;
-    j << (a * R).transpose(), -(a * so3::hat(x)).transpose();
+    j.head<3>() = (a * R).transpose();
+    j.tail<3>() = -(a * so3::hat(x)).transpose();
     const double mpp = x.z() / camera.focal_px();
     const double sigma_px = static_cast<double>(map.points[i].sigma) / mpp;
     const double angle =

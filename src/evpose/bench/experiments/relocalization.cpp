@@ -47,7 +47,8 @@ StartState wrong_start(const std::vector<TimedPose>& truth, TimeNs t, const Star
                        std::mt19937& random) {
   StartState state = start_at(truth, t);
   Vector6d error;
-  error << from.position_m * direction(random), from.rotation_deg * M_PI / 180 * direction(random);
+  error.head<3>() = from.position_m * direction(random);
+  error.tail<3>() = from.rotation_deg * M_PI / 180 * direction(random);
   state.T_map_body = state.T_map_body.plus(error);
   state.velocity.setZero();
   state.angular_rate_body.setZero();

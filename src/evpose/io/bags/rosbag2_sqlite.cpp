@@ -191,8 +191,10 @@ Status SqliteReader::query(const std::string& condition) {
 
 Status SqliteReader::select(const std::vector<std::size_t>& topics) {
   selected_.clear();
-  for (const std::size_t topic : topics)
-    selected_ += (selected_.empty() ? "" : ",") + std::to_string(ids_[topic]);
+  for (const std::size_t topic : topics) {
+    if (!selected_.empty()) selected_ += ',';
+    selected_ += std::to_string(ids_[topic]);
+  }
   return rewind();
 }
 

@@ -19,7 +19,10 @@ std::string formatted(const char* format, Args... args) {
 template <class Items, class Print>
 std::string joined(const Items& items, const Print& print) {
   std::string out;
-  for (std::size_t i = 0; i < items.size(); ++i) out += (i == 0 ? "" : ",") + print(items[i]);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (i > 0) out += ',';
+    out += print(items[i]);
+  }
   return out;
 }
 

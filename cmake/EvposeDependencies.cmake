@@ -1,12 +1,14 @@
 # Every outside library of the project, in one place. Reasons: docs/dependencies.md.
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+if(EVPOSE_ONLY)  # needs nothing else
+  return()
+endif()
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json 3.9 REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
-find_package(Ceres 2 REQUIRED)
 find_package(BZip2 REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(embree 3.12 REQUIRED)
@@ -26,6 +28,7 @@ add_library(evpose_nanoflann INTERFACE)
 target_include_directories(evpose_nanoflann SYSTEM INTERFACE ${EVPOSE_nanoflann_INCLUDE})
 if(EVPOSE_TESTS)
   find_package(GTest REQUIRED)
+  find_package(Ceres 2 REQUIRED)  # what the solvers are compared with
   include(GoogleTest)
   enable_testing()
 endif()

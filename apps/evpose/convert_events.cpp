@@ -94,22 +94,28 @@ Crop crop_of(const ConvertRequest& request, TimeNs first) {
   return out;
 }
 
-Expected<bool> copy_events(EventReader& reader, const EventFilter& filter, EventWriter& writer,
-                           ConvertCounts& counts) {
+Expected<std::optional<ConvertCounts>> write_events(const ConvertRequest& request, EventReader& reader,
+                                                    const EventFilter& filter, EventWriter& writer) {
+  ConvertCounts counts;
   EventPacket packet;
   const EventExtent extent = reader.extent();
   Progress progress("converting");
   while (true) {
-    if (InterruptGuard::interrupted()) return false;
+    if (InterruptGuard::interrupted()) return std::optional<ConvertCounts>();
     const auto more = reader.next(packet);
     if (!more) return more.error();
-    if (!*more) return true;
+    if (!*more) break;
     progress.at(to_seconds(packet.base - extent.first_ns) /
                 std::max(1e-9, to_seconds(extent.last_ns - extent.first_ns)));
     filter.apply(packet, counts);
     if (packet.empty()) continue;
     if (auto status = writer.append(packet); !status) return status.error();
   }
+  if (counts.written == 0)
+    return Error{request.input, "no events are left to be written",
+                 "widen the crop, the region or the polarity"};
+  if (auto status = writer.finish(); !status) return status.error();
+  return std::optional(counts);
 }
 
 namespace {
@@ -184,14 +190,10 @@ Expected<int> convert_events(const ConvertRequest& request) {
   }
   auto writer = create_event_writer(request.output, request.output_format, size);
   if (!writer) return writer.error();
-  ConvertCounts counts;
-  const auto whole = copy_events(**reader, *filter, **writer, counts);
-  if (!whole) return whole.error();
-  if (!*whole) return kInterruptedStatus;
-  if (counts.written == 0)
-    return Error{request.input, "no events are left to be written",
-                 "widen the crop, the region or the polarity"};
-  if (auto status = (*writer)->finish(); !status) return status.error();
+  const auto written = write_events(request, **reader, *filter, **writer);
+  if (!written) return written.error();
+  if (!*written) return kInterruptedStatus;
+  const ConvertCounts& counts = **written;
   std::printf("%s: %lld events", request.output.c_str(), static_cast<long long>(counts.written));
   if (counts.cropped > 0) std::printf(", %lld cropped", static_cast<long long>(counts.cropped));
   if (request.undistort)

@@ -65,9 +65,10 @@ struct Crop {
 };
 Crop crop_of(const ConvertRequest& request, TimeNs first);
 
-/// Copies events; false when interrupted. Errors of reading and writing.
-Expected<bool> copy_events(EventReader& reader, const EventFilter& filter, EventWriter& writer,
-                           ConvertCounts& counts);
+/// Writes the events that pass the filter and ends the file; nullopt when interrupted. An Error where none is
+/// left.
+Expected<std::optional<ConvertCounts>> write_events(const ConvertRequest& request, EventReader& reader,
+                                                    const EventFilter& filter, EventWriter& writer);
 
 // The kinds of conversion; each gives the exit status or an error.
 Expected<int> convert_events(const ConvertRequest& request);

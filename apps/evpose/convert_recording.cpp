@@ -191,16 +191,11 @@ Expected<int> convert_to_bag(const ConvertRequest& request) {
   auto bag = BagWriter::create(request.output, size, {.format = request.output_format});
   if (!bag) return bag.error();
   BagOfAll writer(*std::move(bag), *source);
-  ConvertCounts counts;
-  const auto whole = copy_events(*source->events, *filter, writer, counts);
-  if (!whole) return whole.error();
-  if (!*whole) return kInterruptedStatus;
-  if (counts.written == 0)
-    return Error{request.input, "no events are left to be written",
-                 "widen the crop, the region or the polarity"};
-  if (Status done = writer.finish(); !done) return done.error();
+  const auto written = write_events(request, *source->events, *filter, writer);
+  if (!written) return written.error();
+  if (!*written) return kInterruptedStatus;
   std::printf("%s: %lld events, %zu IMU samples, %zu poses\n", request.output.c_str(),
-              static_cast<long long>(counts.written), source->imu.size(), source->groundtruth.size());
+              static_cast<long long>((*written)->written), source->imu.size(), source->groundtruth.size());
   return 0;
 }
 
@@ -230,14 +225,9 @@ Expected<int> convert_to_recording(const ConvertRequest& request) {
   }
   auto writer = create_event_writer(folder->path("events.h5"), "h5", size);
   if (!writer) return writer.error();
-  ConvertCounts counts;
-  const auto whole = copy_events(*source->events, *filter, **writer, counts);
-  if (!whole) return whole.error();
-  if (!*whole) return kInterruptedStatus;
-  if (counts.written == 0)
-    return Error{request.input, "no events are left to be written",
-                 "widen the crop, the region or the polarity"};
-  if (auto status = (*writer)->finish(); !status) return status.error();
+  const auto written = write_events(request, *source->events, *filter, **writer);
+  if (!written) return written.error();
+  if (!*written) return kInterruptedStatus;
   const Crop crop = crop_of(request, source->first);
   const TimeNs offset = from_seconds(request.offset_s);
   shift_and_crop(source->imu, crop, offset);
@@ -245,7 +235,7 @@ Expected<int> convert_to_recording(const ConvertRequest& request) {
   if (auto status = write_rest(*folder, request.output, *source); !status) return status.error();
   if (auto status = folder->commit(); !status) return status.error();
   std::printf("%s: %lld events, %zu IMU samples, %zu poses\n", request.output.c_str(),
-              static_cast<long long>(counts.written), source->imu.size(), source->groundtruth.size());
+              static_cast<long long>((*written)->written), source->imu.size(), source->groundtruth.size());
   for (const std::string& missing : source->missing) std::printf("missing: %s\n", missing.c_str());
   return 0;
 }

@@ -35,8 +35,7 @@ int build(const BuildRequest& request) {
   map_build::BuildConfig config;
   ConfigTable table;
   describe(table, config);
-  for (const std::string& assignment : request.assignments)
-    if (Status done = apply_assignment(table, assignment); !done) return bad_input(done.error());
+  if (Status done = apply_assignments(table, request.assignments); !done) return bad_input(done.error());
   if (request.viewpoints.size() % 3 != 0)
     return bad_input({"--viewpoint", text("has ", request.viewpoints.size(), " numbers in all"),
                       "give X,Y,Z in metres for each"});

@@ -232,10 +232,7 @@ Expected<ServeConfig> load_serve_config(const TrackRequest& request) {
   config.run.tracker.events.most_mev_s = 6;  // with which two slow cores keep up
   ConfigTable table;
   describe(table, config);
-  if (!request.config_file.empty())
-    if (auto ok = apply_yaml(table, request.config_file); !ok) return ok.error();
-  for (const auto& assignment : request.assignments)
-    if (auto ok = apply_assignment(table, assignment); !ok) return ok.error();
+  if (auto ok = apply_settings(table, request.config_file, request.assignments); !ok) return ok.error();
   return config;
 }
 

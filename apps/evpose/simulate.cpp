@@ -51,9 +51,7 @@ Expected<sim::Scenario> load_scenario(const SimulateRequest& request) {
       if (!file->empty()) *file = (beside / *file).string();
     }
   }
-  for (const std::string& assignment : request.assignments) {
-    if (Status done = apply_assignment(table, assignment); !done) return done.error();
-  }
+  if (Status done = apply_assignments(table, request.assignments); !done) return done.error();
   if (request.duration_s > 0) scenario.duration_s = request.duration_s;
   if (request.seed >= 0) scenario.seed = scenario.world.seed = scenario.trajectory.seed = request.seed;
   return scenario;

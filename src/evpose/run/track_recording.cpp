@@ -123,10 +123,7 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
   RunConfig config;
   ConfigTable table;
   describe(table, config);
-  if (!request.config_file.empty())
-    if (auto ok = apply_yaml(table, request.config_file); !ok) return ok.error();
-  for (const auto& assignment : request.assignments)
-    if (auto ok = apply_assignment(table, assignment); !ok) return ok.error();
+  if (auto ok = apply_settings(table, request.config_file, request.assignments); !ok) return ok.error();
   return config;
 }
 

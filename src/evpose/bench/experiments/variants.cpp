@@ -113,8 +113,7 @@ Expected<Figures> measure(Streams streams, const Variant& variant,
   ConfigTable table;
   describe(table, streams.job.config);
   for (const auto* list : {&variant.settings, &assignments})
-    for (const auto& assignment : *list)
-      if (auto ok = apply_assignment(table, assignment); !ok) return ok.error();
+    if (auto ok = apply_assignments(table, *list); !ok) return ok.error();
   if (!variant.imu) streams.job.setup.motion = MotionModel::constant_velocity;
   auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start, wall_s);
   if (!tracker) return tracker.error();

@@ -36,4 +36,17 @@ Status apply_assignment(ConfigTable& table, const std::string& assignment) {
   return table.set(assignment.substr(0, equals), assignment.substr(equals + 1), "--set");
 }
 
+Status apply_assignments(ConfigTable& table, const std::vector<std::string>& assignments) {
+  for (const std::string& assignment : assignments)
+    if (auto status = apply_assignment(table, assignment); !status) return status;
+  return {};
+}
+
+Status apply_settings(ConfigTable& table, const std::string& path,
+                      const std::vector<std::string>& assignments) {
+  if (!path.empty())
+    if (auto status = apply_yaml(table, path); !status) return status;
+  return apply_assignments(table, assignments);
+}
+
 }  // namespace evpose

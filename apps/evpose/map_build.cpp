@@ -136,8 +136,8 @@ int compare(const CompareRequest& request) {
       "recall %% at 5 and 10 mm of those that count\n",
       score.short_m, score.unseen_m);
   print_classes("  by length          ", "m", 1, score.by_length);
-  print_classes("  by parallel edge at", "cm", 100, score.by_rival);
-  if (!config.flown.empty()) print_classes("  by distance flown  ", "m", 1, score.by_way);
+  print_classes("  by parallel edge at", "cm", 100, score.by_parallel_edge);
+  if (!config.flown.empty()) print_classes("  by distance flown  ", "m", 1, score.by_distance_flown);
   return 0;
 }
 

@@ -22,7 +22,7 @@
 namespace evpose {
 namespace {
 
-constexpr TimeNs kIdle = 5 * kNsPerMs;     // the longest wait for data before links are looked after
+constexpr TimeNs kIdle = 5 * kNsPerMs;     // the longest wait for data before the links are serviced
 constexpr double kAgainPosition_m = 0.03;  // of a pose that is some time old
 constexpr double kAgainRotation_rad = 0.02;
 constexpr double kAgainSpeed_m_s = 0.5;
@@ -127,7 +127,7 @@ class TrackerMaker {
   std::unique_ptr<Tracker> first_;
 };
 
-/// Hands what the source brings to the session, and looks after the outputs, until the source ends or the
+/// Hands what the source brings to the session, and services the outputs, until the source ends or the
 /// program is interrupted.
 void run_session(Source& source, StreamQueue& queue, Session& session, Outputs& outputs) {
   const SourceThread thread(source, queue);
@@ -139,7 +139,7 @@ void run_session(Source& source, StreamQueue& queue, Session& session, Outputs& 
     }
     const TimeNs now = monotonic_ns();
     session.tick(now);
-    outputs.look_after(now);
+    outputs.service(now);
     if (g_reset != 0) {
       g_reset = 0;
       session.reset("asked for by a signal");

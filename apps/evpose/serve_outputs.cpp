@@ -94,7 +94,7 @@ void Outputs::stalled(const std::string& what) {
   if (reporter_) reporter_->stalled(what);
 }
 
-void Outputs::look_after(TimeNs now_ns) {
+void Outputs::service(TimeNs now_ns) {
   if (!reporter_) return;
   for (int i = 0; i < kMostReceived; ++i) {
     const auto bytes = link_->receive();

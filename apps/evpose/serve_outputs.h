@@ -38,7 +38,7 @@ class Outputs {
   void notice(const std::string& words);
   void stalled(const std::string& what);
   /// Reads from the link and sends what is due.
-  void look_after(TimeNs now_ns);
+  void service(TimeNs now_ns);
 
   Health health() const { return health_; }
   /// How the updates were judged: "tracking 98.5 %, initialising 1.5 %"; empty without updates.

@@ -361,7 +361,7 @@ TEST(MapScore, AShiftIsTheDistanceAndHalfTheLengthIsHalfTheRecall) {
   EXPECT_EQ(further.boundary.built_m, 0);
 }
 
-TEST(MapScore, SigmaOfTheBulkIsToldApartFromWrongEdgesAndMarksDoNotCount) {
+TEST(MapScore, SigmaOfTheBulkIsToldApartFromWrongEdgesAndViewDependentContoursDoNotCount) {
   const ContourMap truth = straight_contour(0, 20, 0);
   ContourMap built = truth;
   std::mt19937 random(12);
@@ -386,15 +386,15 @@ TEST(MapScore, RecallIsToldByTheNextParallelEdgeAndByTheDistanceFromWhatWasFlown
   config.flown = {{-3, 0, 0}, {-9, 0, 0}};
   const MapScore score = score_map(straight_contour(0, 1, 0), truth, nullptr, config);
   // Half of the first edge and all of the second have another 20 cm beside them.
-  EXPECT_NEAR(score.by_rival[4].true_m, 2, 0.05);
-  EXPECT_NEAR(score.by_rival[4].recall_5mm, 0.5, 0.02);
-  EXPECT_NEAR(score.by_rival[5].true_m, 1, 0.05);
-  EXPECT_NEAR(score.by_rival[5].recall_5mm, 0, 0.05);
+  EXPECT_NEAR(score.by_parallel_edge[4].true_m, 2, 0.05);
+  EXPECT_NEAR(score.by_parallel_edge[4].recall_5mm, 0.5, 0.02);
+  EXPECT_NEAR(score.by_parallel_edge[5].true_m, 1, 0.05);
+  EXPECT_NEAR(score.by_parallel_edge[5].recall_5mm, 0, 0.05);
   // The first metre of both is 3 to 4 m off, the second of one 4 to 5 m.
-  EXPECT_NEAR(score.by_way[1].true_m, 2, 0.05);
-  EXPECT_NEAR(score.by_way[1].recall_5mm, 0.5, 0.02);
-  EXPECT_NEAR(score.by_way[2].true_m, 1, 0.05);
-  EXPECT_NEAR(score.by_way[2].recall_5mm, 0, 0.05);
+  EXPECT_NEAR(score.by_distance_flown[1].true_m, 2, 0.05);
+  EXPECT_NEAR(score.by_distance_flown[1].recall_5mm, 0.5, 0.02);
+  EXPECT_NEAR(score.by_distance_flown[2].true_m, 1, 0.05);
+  EXPECT_NEAR(score.by_distance_flown[2].recall_5mm, 0, 0.05);
 }
 
 TEST(MapScore, ShortAndUnseenEdgesDoNotCount) {

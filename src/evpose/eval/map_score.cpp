@@ -13,10 +13,10 @@
 namespace evpose {
 namespace {
 
-constexpr float kLink_m = 0.035F;         // true points so near to each other, in line, are of one edge
-constexpr float kSameEdge_m = 0.003F;     // if they are so near across it
-constexpr double kOutlierSigma = 3.5;     // one in 450 by chance
-constexpr float kFurthestRival_m = 0.3F;  // parallel edges further apart do not disturb each other
+constexpr float kLink_m = 0.035F;            // true points so near to each other, in line, are of one edge
+constexpr float kSameEdge_m = 0.003F;        // if they are so near across it
+constexpr double kOutlierSigma = 3.5;        // one in 450 by chance
+constexpr float kFurthestParallel_m = 0.3F;  // parallel edges further apart do not disturb each other
 
 std::vector<Eigen::Vector3f> positions(const ContourMap& map, const Eigen::Vector3d& anchor) {
   std::vector<Eigen::Vector3f> out;
@@ -48,10 +48,10 @@ std::vector<std::uint32_t> edges_of(const ContourMap& map, const std::vector<Eig
 }
 
 /// Distance of the nearest point of another edge that runs parallel beside each point; infinite beyond
-/// kFurthestRival_m.
-std::vector<float> rivals_of(const ContourMap& map, const std::vector<Eigen::Vector3f>& at,
-                             const std::vector<std::uint32_t>& edge) {
-  const PointGrid grid(at, kFurthestRival_m);
+/// kFurthestParallel_m.
+std::vector<float> parallel_distances(const ContourMap& map, const std::vector<Eigen::Vector3f>& at,
+                                      const std::vector<std::uint32_t>& edge) {
+  const PointGrid grid(at, kFurthestParallel_m);
   std::vector<float> out(at.size(), INFINITY);
   for (std::uint32_t i = 0; i < at.size(); ++i) {
     const Eigen::Vector3f& t = map.points[i].tangent;
@@ -59,7 +59,7 @@ std::vector<float> rivals_of(const ContourMap& map, const std::vector<Eigen::Vec
       if (edge[j] == edge[i] || std::abs(t.dot(map.points[j].tangent)) < 0.95F) return;
       const Eigen::Vector3f d = at[j] - at[i];
       const float along = t.dot(d), across = (d - along * t).norm();
-      if (std::abs(along) < kLink_m && across < kFurthestRival_m && across > kSameEdge_m)
+      if (std::abs(along) < kLink_m && across < kFurthestParallel_m && across > kSameEdge_m)
         out[i] = std::min(out[i], across);
     });
   }
@@ -241,7 +241,7 @@ void judge_recall(const ContourMap& truth, const std::vector<Eigen::Vector3f>& a
                   const SeenPlaces& seen, const MapScoreConfig& config, Tallies& tallies, MapScore& out) {
   const auto edges = edges_of(truth, at);
   const auto lengths = edge_lengths(truth, edges);
-  const auto rivals = rivals_of(truth, at, edges);
+  const auto parallel = parallel_distances(truth, at, edges);
   for (std::size_t i = 0; i < at.size(); ++i) {
     const ContourPoint& p = truth.points[i];
     const auto weight = static_cast<double>(p.length);
@@ -256,9 +256,9 @@ void judge_recall(const ContourMap& truth, const std::vector<Eigen::Vector3f>& a
     const Match match = in_built.nearest(at[i], p.tangent);
     tallies.all.truth(weight, match);
     count(out.by_length, lengths[i], weight, match.across_m);
-    count(out.by_rival, static_cast<double>(rivals[i]), weight, match.across_m);
+    count(out.by_parallel_edge, static_cast<double>(parallel[i]), weight, match.across_m);
     if (!config.flown.empty())
-      count(out.by_way, distance_m(config.flown, truth.position(i)), weight, match.across_m);
+      count(out.by_distance_flown, distance_m(config.flown, truth.position(i)), weight, match.across_m);
     if (Tally* tally = tallies.of_kind(p.kind)) tally->truth(weight, match);
   }
 }
@@ -281,8 +281,8 @@ MapScore score_map(const ContourMap& judged, const ContourMap& truth, const Poin
   MapScore out;
   judge_recall(truth, of_truth, in_built, seen, config, tallies, out);
   finish(out.by_length);
-  finish(out.by_rival);
-  finish(out.by_way);
+  finish(out.by_parallel_edge);
+  finish(out.by_distance_flown);
   out.all = tallies.all.finish();
   out.crease = tallies.crease.finish();
   out.boundary = tallies.boundary.finish();

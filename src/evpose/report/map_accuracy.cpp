@@ -15,9 +15,9 @@
 namespace evpose {
 namespace {
 
-constexpr double kShared_px = 0.35;  // as in registration: error that neighbouring events share
+constexpr double kCorrelated_px = 0.35;  // as in registration: correlated error of neighbouring events
 constexpr double kCell_px = 32;
-constexpr double kUntold = 1e3;  // m or rad: prior of a pose of which nothing is told
+constexpr double kUnknown = 1e3;  // m or rad: prior sigma of an unknown pose
 
 }  // namespace
 
@@ -52,11 +52,11 @@ ViewAccuracy expected_accuracy(const ContourMap& map, std::span<const std::uint3
         clusters[{static_cast<int>(pixel->x() / kCell_px), static_cast<int>(pixel->y() / kCell_px),
                   static_cast<int>(angle / (std::numbers::pi / 4))}];
     cluster.information += j * j.transpose();
-    cluster.variance += kShared_px * kShared_px + sigma_px * sigma_px;
+    cluster.variance += kCorrelated_px * kCorrelated_px + sigma_px * sigma_px;
     ++cluster.count;
     ++out.points;
   }
-  Matrix6d information = Matrix6d::Identity() / (kUntold * kUntold);
+  Matrix6d information = Matrix6d::Identity() / (kUnknown * kUnknown);
   for (const auto& [key, cluster] : clusters) information += cluster.information / cluster.variance;
   out.clusters = clusters.size();
   const Matrix6d covariance = information.ldlt().solve(Matrix6d::Identity());

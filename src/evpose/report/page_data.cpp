@@ -57,7 +57,7 @@ Json columns(const std::vector<std::size_t>& indices, int digits, Position&& pos
 
 Json path_json(const std::string& name, const std::string& role, std::span<const TimedPose> path,
                TimeNs origin) {
-  const std::vector<std::size_t> indices = spread_indices(path.size(), kPathPoints);
+  const std::vector<std::size_t> indices = evenly_spaced_indices(path.size(), kPathPoints);
   Json out = columns(indices, 8, [&](std::size_t i) { return path[i].pose.p; });
   out["name"] = name;
   out["role"] = role;
@@ -317,7 +317,8 @@ std::string run_page(const RunPage& run) {
     if (!log.rows.empty() && p.t >= log.rows.front().t && p.t <= log.rows.back().t) truth.push_back(p);
   add_paths(estimate, truth, origin, &data);
   if (const auto near = points_near(run.summary.map_points, estimate, truth); !near.empty())
-    data["map"] = columns(spread_indices(near.size(), kMapPoints), 6, [&](std::size_t i) { return near[i]; });
+    data["map"] =
+        columns(evenly_spaced_indices(near.size(), kMapPoints), 6, [&](std::size_t i) { return near[i]; });
   if (run.score) add_errors(*run.score, origin, &data);
   if (!log.rows.empty()) {
     data["activity"] = activity_json(log, origin);

@@ -151,10 +151,10 @@ TEST(Series, ThinningKeepsPeaksAndEnds) {
 }
 
 TEST(Series, SpreadIndicesReachBothEnds) {
-  EXPECT_EQ(spread_indices(10, 3), (std::vector<std::size_t>{0, 4, 9}));
-  EXPECT_EQ(spread_indices(2, 5), (std::vector<std::size_t>{0, 1}));
-  EXPECT_TRUE(spread_indices(0, 5).empty());
-  EXPECT_EQ(spread_indices(7, 1), (std::vector<std::size_t>{0}));
+  EXPECT_EQ(evenly_spaced_indices(10, 3), (std::vector<std::size_t>{0, 4, 9}));
+  EXPECT_EQ(evenly_spaced_indices(2, 5), (std::vector<std::size_t>{0, 1}));
+  EXPECT_TRUE(evenly_spaced_indices(0, 5).empty());
+  EXPECT_EQ(evenly_spaced_indices(7, 1), (std::vector<std::size_t>{0}));
 }
 
 TEST(Series, HistogramSharesAddUpToOne) {

@@ -31,7 +31,7 @@ Series thin(const Series& series, std::size_t points) {
   return out;
 }
 
-std::vector<std::size_t> spread_indices(std::size_t size, std::size_t count) {
+std::vector<std::size_t> evenly_spaced_indices(std::size_t size, std::size_t count) {
   const std::size_t n = std::min(size, count);
   std::vector<std::size_t> out;
   out.reserve(n);

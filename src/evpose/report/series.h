@@ -23,7 +23,7 @@ struct Series {
 Series thin(const Series& series, std::size_t points);
 
 /// At most `count` of the indices 0 .. size-1, evenly, first and last among them.
-std::vector<std::size_t> spread_indices(std::size_t size, std::size_t count);
+std::vector<std::size_t> evenly_spaced_indices(std::size_t size, std::size_t count);
 
 /// Shares of the values per bin; the bins have equal width on a log axis.
 struct LogHistogram {

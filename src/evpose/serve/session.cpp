@@ -20,8 +20,7 @@ void describe(ConfigTable& table, SessionConfig& c) {
             {0.01, 1e4});
   table.add("largest_gap_s", c.largest_gap_s, "s",
             "data time without data after which the tracker starts anew", {0.01, 1e4});
-  table.add("carry_s", c.carry_s, "s", "data time without events for which the IMU alone carries the pose",
-            {0, 1e4});
+  table.add("imu_only_s", c.imu_only_s, "s", "data time without events that the IMU alone bridges", {0, 1e4});
   table.add("wait_imu_s", c.wait_imu_s, "s", "events further ahead of the IMU are shed", {0.001, 10});
 }
 
@@ -100,9 +99,9 @@ void Session::restart(const std::string& why, bool from_last) {
   hooks_.restarted(why);
 }
 
-bool Session::carried(const Stream& stream, TimeNs t) const {
+bool Session::bridged_by_imu(const Stream& stream, TimeNs t) const {
   return &stream == &events_ && has_imu_ && imu_.any() && to_seconds(t - imu_.last) <= config_.wait_imu_s &&
-         to_seconds(t - stream.last) <= config_.carry_s;
+         to_seconds(t - stream.last) <= config_.imu_only_s;
 }
 
 bool Session::follows(Stream& stream, TimeNs t) {
@@ -112,7 +111,7 @@ bool Session::follows(Stream& stream, TimeNs t) {
             true);
     return true;
   }
-  if (to_seconds(t - stream.last) > config_.largest_gap_s && !carried(stream, t)) {
+  if (to_seconds(t - stream.last) > config_.largest_gap_s && !bridged_by_imu(stream, t)) {
     restart(text("no ", stream.name, " for ", to_seconds(t - stream.last), " s of their clock"), true);
     return true;
   }

@@ -20,7 +20,7 @@ class ConfigTable;
 struct SessionConfig {
   double stall_s = 0.3;        ///< of the wall clock without data: the stream is called stalled
   double largest_gap_s = 0.3;  ///< of data time without events or IMU: the tracker starts anew
-  double carry_s = 2;          ///< but without events so long, if the IMU goes on: it carries the pose
+  double imu_only_s = 2;       ///< the IMU alone bridges so much data time without events
   double wait_imu_s = 0.1;     ///< events further ahead of the IMU are shed
 };
 void describe(ConfigTable& table, SessionConfig& config);
@@ -70,8 +70,8 @@ class Session {
   void take_imu(const std::vector<ImuSample>& samples, TimeNs now_ns);
   /// Whether data of time `t` follow; if the clock jumped, the tracker is given up first.
   bool follows(Stream& stream, TimeNs t);
-  /// The IMU has gone on while no events came, and not for too long.
-  bool carried(const Stream& stream, TimeNs t) const;
+  /// The IMU has gone on while no events came, and not for too long: no new start is needed.
+  bool bridged_by_imu(const Stream& stream, TimeNs t) const;
   void arrived(Stream& stream, TimeNs now_ns) const;
   void check_stall(Stream& stream, TimeNs now_ns);
   void restart(const std::string& why, bool from_last);

@@ -142,7 +142,7 @@ std::vector<Replay> plan(const FaultsRequest& request, std::size_t recordings) {
 void print_replay(const Replay& replay, const std::string& recording, const ReplayOutcome& o) {
   std::printf(
       "%d %s on %s: %d of %d silent, %.3f to %.3f s after the fault began, up to %.1f sigma, "
-      "%.1f mm; named %d (%s); of no use %d, told after %.3f s; %.1f mm at the end\n",
+      "%.1f mm; named %d (%s); of no use %d, reported after %.3f s; %.1f mm at the end\n",
       replay.number, kFaultNames[static_cast<std::size_t>(replay.fault)], recording.c_str(), o.silent,
       o.updates, o.silent_from_s, o.silent_to_s, o.worst, o.worst_mm, o.named ? 1 : 0, o.first_reason.c_str(),
       o.lost ? 1 : 0, o.flag_delay_s, o.end_error_mm);
@@ -189,8 +189,8 @@ FaultRow print_table(const FaultsRequest& request, const std::vector<Replay>& re
   std::printf("%d replays of %.1f s (room_720p is shorter), seed %u.\n\n", static_cast<int>(replays.size()),
               kStretch_s, request.seed);
   std::printf(
-      "| fault | replays | named | first words | updates | silent updates | in replays | pose of no use "
-      "| of these told within 50 ms | end error median / max mm | not finite |\n"
+      "| fault | replays | named | first reason | updates | silent updates | in replays | pose of no use "
+      "| of these reported within 50 ms | end error median / max mm | not finite |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n");
   FaultRow all;
   for (std::size_t f = 0; f < kFaultNames.size(); ++f) {
@@ -203,7 +203,7 @@ FaultRow print_table(const FaultsRequest& request, const std::vector<Replay>& re
     if (row.replays > 0) print_row(kFaultNames[f], row);
   }
   std::printf(
-      "\n%d of %d updates are beyond %.0f sigma while called tracking, in %d replays; %d losses are told "
+      "\n%d of %d updates are beyond %.0f sigma while called tracking, in %d replays; %d losses are reported "
       "late or never; %d replays without a finite pose.\n",
       all.silent, all.updates, kWrongSigma, all.silent_replays, all.lost - all.flagged, all.not_finite);
   return all;

@@ -35,11 +35,10 @@ namespace {
 
 constexpr TimeNs kHeartbeat = kNsPerS, kTimesync = kNsPerS, kOrigin = kNsPerS, kTarget = 100 * kNsPerMs;
 constexpr TimeNs kLongestRoundTrip = 10 * kNsPerMs;
-constexpr int kFirstReplies = 5;  // whose round trip may be longer
-constexpr int kRestartMinimumAfter =
-    30;                          // a minimum of more than so many replies ago is given up: clocks drift
-constexpr int kFailedPoses = 3;  // a datagram may be lost
-constexpr TimeNs kEarly = 8;     // a pose may be sent this part of a period early
+constexpr int kFirstReplies = 5;     // whose round trip may be longer
+constexpr int kMinimumReplies = 30;  // after so many the least round trip is sought anew: clocks drift
+constexpr int kFailedPoses = 3;      // a datagram may be lost
+constexpr TimeNs kEarly = 8;         // a pose may be sent this part of a period early
 constexpr double kJump_m = 0.1, kJump_rad = 0.1;  // more than motion explains between two updates
 constexpr double kPoorSigma_m = 0.1;              // halves the quality
 constexpr int kDegradedQuality = 25;
@@ -72,7 +71,7 @@ void set(float& x, float& y, float& z, const Eigen::Vector3d& v) {
 void ClockOffset::add(TimeNs sent, TimeNs received, TimeNs theirs) {
   const TimeNs round_trip = received - sent;
   if (round_trip < 0 || (count_ >= kFirstReplies && round_trip > kLongestRoundTrip)) return;
-  if (++count_ % kRestartMinimumAfter == 0) round_trip_ = std::numeric_limits<TimeNs>::max();
+  if (++count_ % kMinimumReplies == 0) round_trip_ = std::numeric_limits<TimeNs>::max();
   if (round_trip > round_trip_) return;
   round_trip_ = round_trip;
   offset_ = theirs - (sent + round_trip / 2);

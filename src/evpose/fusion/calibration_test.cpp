@@ -19,7 +19,9 @@ struct Wrong {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
   bool hover = false;
-  bool seen_anew = false;  ///< the flight begins with a pose of the camera, as a search finds it
+  bool seen_anew = false;             ///< the flight begins with a pose of the camera, as a search finds it
+  std::vector<double> offsets_m;      ///< of the segments of the map; none: the pose is measured as a whole
+  Vector6d start = Vector6d::Zero();  ///< error of the pose at the start
 };
 
 ImuSample still(TimeNs t) { return {t, {0, 0, 0}, -kGravity}; }
@@ -38,23 +40,66 @@ Eigen::Vector3d draw(std::mt19937& random, double sigma) {
 
 struct Found {
   Calibration calibration;
-  double frozen = 0;  ///< share of the updates
+  std::vector<SegmentOffsets::Segment> segments;
+  Eigen::MatrixXd covariance;  ///< of the blocks: calibration, then segments
+  double frozen = 0;           ///< share of the updates
 };
 
-Found fly(const Wrong& wrong, const CalibrationConfig& calibration, const SlowErrorsConfig& slow,
-          int seconds) {
+FusionConfig flight_config(const CalibrationConfig& calibration) {
   FusionConfig config;
   config.imu_noise_scale = 1;
   config.imu_scale_sigma = 0;
   config.start_rotation_sigma_rad = 0.03;
   config.start_position_sigma_m = 0.03;
+  config.calibration = calibration;
+  return config;
+}
+
+/// What the camera's contours, some of each segment, say of the pose that it sees; their segments stand off.
+std::vector<ContourOffset> see_segments(const Pose& seen, const Pose& predicted,
+                                        const std::vector<double>& offsets_m, std::mt19937& random) {
+  constexpr double kWeight_px2 = 25;  // a fifth of a pixel
+  std::mt19937 layout(3);             // the map is the same at each update
+  std::uniform_real_distribution<double> place(-1, 1);
+  std::normal_distribution<double> noise(0, 1 / std::sqrt(kWeight_px2));
+  const Vector6d ahead = seen.minus(predicted);
+  std::vector<ContourOffset> out;
+  for (std::uint32_t segment = 0; segment < offsets_m.size(); ++segment) {
+    const Eigen::Vector3d middle(1 + 3 * place(layout), 2 + 3 * place(layout), 1 + 3 * place(layout));
+    const Eigen::Vector3d across = Eigen::Vector3d(place(layout), place(layout), place(layout)).normalized();
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector3d point = middle + 0.2 * k * across.unitOrthogonal();
+      ContourOffset contour{predicted.inverse() * point, predicted.q.conjugate() * (200 * across), 0,
+                            kWeight_px2, segment};
+      Vector6d by_pose;
+      by_pose << 200 * across, contour.point_body.cross(contour.across_body);
+      contour.offset_px = by_pose.dot(ahead) - 200 * offsets_m[segment] + noise(random);
+      out.push_back(contour);
+    }
+  }
+  return out;
+}
+
+/// The measurement of the pose as a registration sums it up over contours.
+PoseInformation summed(const std::vector<ContourOffset>& contours, const Pose& at) {
+  PoseInformation sum;
+  for (const ContourOffset& contour : contours) {
+    Vector6d by_pose;
+    by_pose << at.q * contour.across_body, contour.point_body.cross(contour.across_body);
+    sum.information += contour.weight * by_pose * by_pose.transpose();
+    sum.vector += contour.weight * contour.offset_px * by_pose;
+  }
+  return sum;
+}
+
+Found fly(const Wrong& wrong, const FusionConfig& config, int seconds, unsigned seed = 17) {
   const ImuNoise noise;
   const Pose T_body_cam{so3::exp({0.1, -1.2, 0.4}), {0.1, 0.02, -0.05}};
   const Pose true_T_body_cam{so3::exp(wrong.turn) * T_body_cam.q, T_body_cam.p + wrong.shift};
   const Eigen::Vector3d gravity = so3::exp({wrong.tilt.x(), wrong.tilt.y(), 0}) * kGravity;
 
   // Truth and readings, sample by sample; the IMU's clock is ahead by the offset.
-  std::mt19937 random(17);
+  std::mt19937 random(seed);
   const int samples = seconds * static_cast<int>(1000 * kNsPerMs / kStep) + 50;
   std::vector<NavState> truth{{{so3::exp({0.1, -0.2, 0.8}), {1, 2, 1}}, {0, 0, 0}}};
   if (wrong.hover) truth[0].T_map_body.q = Eigen::Quaterniond::Identity();
@@ -77,9 +122,11 @@ Found fly(const Wrong& wrong, const CalibrationConfig& calibration, const SlowEr
     return interpolate(readings[k], readings[k + 1], clock);
   };
 
-  Ekf ekf(StatePropagator(MotionModel::imu, config, noise), calibration, slow, T_body_cam);
+  Ekf ekf(StatePropagator(MotionModel::imu, config, noise), config, T_body_cam);
   const std::size_t first = 20;
-  ekf.start(static_cast<TimeNs>(first) * kStep, truth[first], {0, 0, 0});
+  NavState start = truth[first];
+  start.T_map_body = start.T_map_body.plus(wrong.start);
+  ekf.start(static_cast<TimeNs>(first) * kStep, start, {0, 0, 0});
   if (wrong.seen_anew) {
     FusionState seen = ekf.state();
     seen.nav.T_map_body = truth[first].T_map_body * true_T_body_cam * T_body_cam.inverse();
@@ -97,22 +144,37 @@ Found fly(const Wrong& wrong, const CalibrationConfig& calibration, const SlowEr
       const TimeNs grid = readings[0].t + ((from - readings[0].t) / kStep + 1) * kStep;
       ekf.predict(reading_at(from), reading_at(std::min(grid, until)), ImuTrust::good);
     }
+    ++updates;
+    out.frozen += ekf.calibration().frozen ? 1 : 0;
+    const Pose assumed{now.turn * T_body_cam.q, T_body_cam.p + now.shift};
+    if (!wrong.offsets_m.empty()) {
+      const Pose& predicted = ekf.state().nav.T_map_body;
+      const Pose seen = truth[k].T_map_body * true_T_body_cam * assumed.inverse();
+      const auto contours = see_segments(seen, predicted, wrong.offsets_m, random);
+      ekf.update(summed(contours, predicted), contours);
+      continue;
+    }
     Vector6d scatter;
     scatter << draw(random, 1e-3), draw(random, 5e-4);
     const Pose T_map_cam = truth[k].T_map_body.plus(scatter) * true_T_body_cam;
-    const Pose assumed{now.turn * T_body_cam.q, T_body_cam.p + now.shift};
     PoseInformation m;
     Vector6d information;
     information << 1e6, 1e6, 1e6, 4e6, 4e6, 4e6;
     m.information = information.asDiagonal();
     m.vector = m.information * (T_map_cam * assumed.inverse()).minus(ekf.state().nav.T_map_body);
     ekf.update(m);
-    ++updates;
-    out.frozen += ekf.calibration().frozen ? 1 : 0;
   }
   out.frozen /= updates;
   out.calibration = ekf.calibration();
+  out.segments.assign(ekf.segments().begin(), ekf.segments().end());
+  out.covariance = ekf.filter().joint_covariance();
+  out.covariance =
+      out.covariance.bottomRightCorner(ekf.filter().block_states(), ekf.filter().block_states()).eval();
   return out;
+}
+
+Found fly(const Wrong& wrong, const CalibrationConfig& calibration, int seconds) {
+  return fly(wrong, flight_config(calibration), seconds);
 }
 
 double rotation_error_deg(const Calibration& found, const Eigen::Vector3d& turn) {
@@ -125,7 +187,7 @@ TEST(Calibration, TimeOffsetOfTwentyMillisecondsIsFoundToATenth) {
   for (const double offset_s : {-0.02, 0.0, 0.02}) {
     Wrong wrong;
     wrong.offset_s = offset_s;
-    const Calibration found = fly(wrong, c, {}, 5).calibration;
+    const Calibration found = fly(wrong, c, 5).calibration;
     EXPECT_NEAR(found.time_offset_s, offset_s, 1e-4);
     EXPECT_LT(std::abs(found.time_offset_s - offset_s), 4 * found.time_sigma_s + 1e-5);
     EXPECT_FALSE(found.frozen);
@@ -137,7 +199,7 @@ TEST(Calibration, RotationOfOneDegreeIsFoundToAFiftieth) {
   c.rotation = true;
   Wrong wrong;
   wrong.turn = Eigen::Vector3d(0.6, -0.5, 0.62) * (M_PI / 180);
-  const Calibration found = fly(wrong, c, {}, 12).calibration;
+  const Calibration found = fly(wrong, c, 12).calibration;
   EXPECT_LT(rotation_error_deg(found, wrong.turn), 0.02);
   EXPECT_LT(found.turn_sigma_rad.norm() * 180 / M_PI, 0.02);
 }
@@ -148,7 +210,7 @@ TEST(Calibration, APoseThatTheCameraFoundDoesNotVouchForTheBody) {
   Wrong wrong;
   wrong.turn = Eigen::Vector3d(0.6, -0.5, 0.62) * (M_PI / 180);
   wrong.seen_anew = true;
-  EXPECT_LT(rotation_error_deg(fly(wrong, c, {}, 12).calibration, wrong.turn), 0.02);
+  EXPECT_LT(rotation_error_deg(fly(wrong, c, 12).calibration, wrong.turn), 0.02);
 }
 
 TEST(Calibration, PlaceOfTheCameraIsFoundToAMillimetre) {
@@ -156,7 +218,7 @@ TEST(Calibration, PlaceOfTheCameraIsFoundToAMillimetre) {
   c.translation = true;
   Wrong wrong;
   wrong.shift = {0.01, -0.015, 0.008};
-  const Calibration found = fly(wrong, c, {}, 12).calibration;
+  const Calibration found = fly(wrong, c, 12).calibration;
   EXPECT_LT((found.shift - wrong.shift).norm(), 1e-3);
   EXPECT_LT((found.shift - wrong.shift).cwiseQuotient(found.shift_sigma_m).cwiseAbs().maxCoeff(), 4);
 }
@@ -168,7 +230,7 @@ TEST(Calibration, AllThreeAreFoundTogether) {
   wrong.offset_s = 0.005;
   wrong.turn = Eigen::Vector3d(-0.3, 0.5, 0.2) * (M_PI / 180);
   wrong.shift = {-0.005, 0.01, 0.004};
-  const Calibration found = fly(wrong, c, {}, 12).calibration;
+  const Calibration found = fly(wrong, c, 12).calibration;
   EXPECT_NEAR(found.time_offset_s, wrong.offset_s, 1e-4);
   EXPECT_LT(rotation_error_deg(found, wrong.turn), 0.02);
   EXPECT_LT((found.shift - wrong.shift).norm(), 1e-3);
@@ -180,7 +242,7 @@ TEST(Calibration, InHoverItIsFrozenAndSaidSo) {
   Wrong wrong;
   wrong.hover = true;
   wrong.turn = {0.01, 0, 0};
-  const Found found = fly(wrong, c, {}, 3);
+  const Found found = fly(wrong, c, 3);
   EXPECT_GT(found.frozen, 0.99);
   EXPECT_TRUE(found.calibration.frozen);
   EXPECT_EQ(found.calibration.time_offset_s, 0);
@@ -189,20 +251,20 @@ TEST(Calibration, InHoverItIsFrozenAndSaidSo) {
 }
 
 TEST(Calibration, TiltOfTheMapIsFound) {
-  SlowErrorsConfig slow;
-  slow.gravity = true;
+  CalibrationConfig c;
+  c.gravity = true;
   Wrong wrong;
   wrong.tilt = {0.005, -0.004};
-  const Calibration found = fly(wrong, {}, slow, 12).calibration;
+  const Calibration found = fly(wrong, c, 12).calibration;
   EXPECT_LT((found.gravity_tilt_rad - wrong.tilt).norm(), 4e-4);
   EXPECT_LT(
       (found.gravity_tilt_rad - wrong.tilt).cwiseQuotient(found.gravity_sigma_rad).cwiseAbs().maxCoeff(), 4);
 }
 
 TEST(Calibration, WhatWasFoundOutlivesANewStart) {
-  CalibrationConfig c;
-  c.time_offset = true;
-  Ekf ekf(StatePropagator(MotionModel::imu, FusionConfig{}, ImuNoise{}), c);
+  FusionConfig c;
+  c.calibration.time_offset = true;
+  Ekf ekf(StatePropagator(MotionModel::imu, c, ImuNoise{}), c);
   NavState nav;
   nav.velocity = {1, 0, 0};
   ekf.start(0, nav, {0, 0, 0});
@@ -222,56 +284,80 @@ TEST(Calibration, WhatWasFoundOutlivesANewStart) {
   EXPECT_EQ(ekf.calibration().time_sigma_s, before.time_sigma_s);
 }
 
-/// An error of the measured pose that lasts is not taken for the pose when the filter knows of it.
-TEST(SlowErrors, ALastingOffsetMakesThePoseHonest) {
-  FusionConfig config;
-  config.imu_noise_scale = 1;
-  config.imu_scale_sigma = 0;
-  for (const bool known : {false, true}) {
-    std::mt19937 random(3);
-    SlowErrorsConfig slow;
-    slow.pose_offset = known;
-    slow.offset_position_sigma_m = 2e-3;
-    slow.offset_rotation_sigma_rad = 1e-9;
-    slow.offset_s = 0.3;
-    double nees = 0;
-    int count = 0;
-    for (int run = 0; run < 6; ++run) {
-      Ekf ekf(StatePropagator(MotionModel::imu, config, ImuNoise{}), {}, slow);
-      ekf.start(0, {}, {0, 0, 0});
-      Eigen::Vector3d offset = draw(random, 2e-3);
-      const double keep = std::exp(-to_seconds(kStep) / slow.offset_s);
-      NavState truth;
-      for (int k = 0; k < 1000; ++k) {
-        ImuSample a = still(k * kStep), b = still((k + 1) * kStep);
-        const double rate = std::sqrt(1 / to_seconds(kStep));
-        const ImuNoise noise;
-        const Eigen::Vector3d ng = draw(random, noise.gyro_density * rate),
-                              na = draw(random, noise.accel_density * rate);
-        for (ImuSample* s : {&a, &b}) s->gyro += ng, s->accel += na;
-        ekf.predict(a, b, ImuTrust::good);
-        offset = keep * offset + draw(random, 2e-3 * std::sqrt(1 - keep * keep));
-        PoseInformation m;
-        Vector6d information, z;
-        information << 1e6, 1e6, 1e6, 4e6, 4e6, 4e6;
-        z.head<3>() = offset;
-        z.head<3>() += draw(random, 1e-3);
-        z.tail<3>() = draw(random, 5e-4);
-        m.information = information.asDiagonal();
-        const Vector6d ahead = truth.T_map_body.minus(ekf.state().nav.T_map_body);
-        m.vector = m.information * (ahead + z);
-        ekf.update(m);
-        if (k < 300) continue;
-        const Eigen::Vector3d e = ekf.state().nav.T_map_body.p - truth.T_map_body.p;
-        nees += e.dot(ekf.state().covariance.topLeftCorner<3, 3>().inverse() * e) / 3;
-        ++count;
-      }
-    }
-    if (known)
-      EXPECT_NEAR(nees / count, 1, 0.5);
-    else
-      EXPECT_GT(nees / count, 5);
+TEST(Calibration, TheSeenPoseDependsOnItAsDifferencesSay) {
+  CalibrationConfig c;
+  c.time_offset = c.rotation = c.translation = true;
+  const Pose given{so3::exp({0.1, -1.2, 0.4}), {0.1, 0.02, -0.05}};
+  ErrorStateFilter filter;
+  FusionState state;
+  state.nav = {{so3::exp({0.3, -0.2, 1.1}), {1, 2, 3}}, {0.5, -1, 0.2}};
+  state.angular_rate = {0.3, 0.7, -0.4};
+  filter.reset_state(state);
+  CalibrationStates states(c, given);
+  states.start(filter);
+  const std::vector<PoseShift> shifts = states.pose_shifts(state);
+  ASSERT_EQ(shifts.size(), 3U);
+  // The pose that a camera sees that is mounted, and timed, otherwise than given.
+  const auto seen = [&](const Eigen::Matrix<double, 7, 1>& d) {
+    const Pose body{state.nav.T_map_body.q * so3::exp(d(0) * state.angular_rate),
+                    state.nav.T_map_body.p + d(0) * state.nav.velocity};
+    const Pose mounted{so3::exp(d.segment<3>(1)) * given.q, given.p + d.tail<3>()};
+    return body * mounted * given.inverse();
+  };
+  Eigen::Matrix<double, 6, 7> expected, got;
+  for (int i = 0; i < 7; ++i) {
+    const Eigen::Matrix<double, 7, 1> d = 1e-6 * Eigen::Matrix<double, 7, 1>::Unit(i);
+    expected.col(i) = (seen(d).minus(state.nav.T_map_body) - seen(-d).minus(state.nav.T_map_body)) / 2e-6;
   }
+  got << shifts[0].by_block, shifts[1].by_block, shifts[2].by_block;
+  EXPECT_LT((got - expected).cwiseAbs().maxCoeff(), 1e-7);
+}
+
+/// A camera that is mounted and timed otherwise than given, before a map whose segments stand off.
+TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
+  constexpr int kRuns = 8, kSegments = 24, kStates = 7 + kSegments;
+  CalibrationConfig c;
+  c.time_offset = c.rotation = c.translation = true;
+  c.start_time_sigma_s = 3e-3;
+  c.start_rotation_sigma_rad = 5e-3;
+  c.start_translation_sigma_m = 5e-3;
+  FusionConfig config = flight_config(c);
+  config.segment_offsets = SegmentOffsetUse::on;
+  config.segments.sigma_m = 3e-3;
+  config.start_position_sigma_m = 0.01;
+  config.start_rotation_sigma_rad = 5e-3;
+  double nees = 0, worst = 0;
+  for (unsigned run = 0; run < kRuns; ++run) {
+    std::mt19937 random(100 + run);
+    Wrong wrong;
+    wrong.offset_s = draw(random, c.start_time_sigma_s).x();
+    wrong.turn = draw(random, c.start_rotation_sigma_rad);
+    wrong.shift = draw(random, c.start_translation_sigma_m);
+    wrong.start << draw(random, config.start_position_sigma_m), draw(random, config.start_rotation_sigma_rad);
+    for (int i = 0; i < kSegments; ++i) wrong.offsets_m.push_back(draw(random, config.segments.sigma_m).x());
+    const Found found = fly(wrong, config, 6, 200 + run);
+    ASSERT_EQ(found.segments.size(), kSegments);
+    ASSERT_EQ(found.covariance.rows(), kStates);
+    EXPECT_LT(found.frozen, 0.2);
+    Eigen::VectorXd error(kStates);
+    error << wrong.offset_s - found.calibration.time_offset_s,
+        so3::log(so3::exp(wrong.turn) * found.calibration.turn.conjugate()),
+        wrong.shift - found.calibration.shift, Eigen::VectorXd::Zero(kSegments);
+    for (int i = 0; i < kSegments; ++i) {
+      const SegmentOffsets::Segment& segment = found.segments[static_cast<std::size_t>(i)];
+      error(7 + i) = wrong.offsets_m[segment.number] - segment.offset_m;
+    }
+    nees += error.dot(found.covariance.ldlt().solve(error)) / kStates / kRuns;
+    const Eigen::VectorXd sigma = found.covariance.diagonal().cwiseSqrt();
+    worst = std::max(worst, error.cwiseQuotient(sigma).cwiseAbs().maxCoeff());
+    // Both are learnt: the calibration to a part of what was known, the map but for its place as a whole.
+    EXPECT_LT(found.calibration.time_sigma_s, 0.05 * c.start_time_sigma_s);
+    EXPECT_LT(found.calibration.turn_sigma_rad.maxCoeff(), 0.3 * c.start_rotation_sigma_rad);
+    EXPECT_LT(found.calibration.shift_sigma_m.maxCoeff(), 0.5 * c.start_translation_sigma_m);
+    EXPECT_LT(sigma.tail(kSegments).maxCoeff(), 0.8 * config.segments.sigma_m);
+  }
+  EXPECT_NEAR(nees, 1, 0.3);
+  EXPECT_LT(worst, 4);
 }
 
 }  // namespace

@@ -5,18 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evpose/core/config.h"
-
 namespace evpose {
 
-void describe(ConfigTable& table, ParticleConfig& c) {
-  table.add("particles", c.particles, "", "number of particles", {20, 1e6});
-}
-
-ParticleFilter::ParticleFilter(const StatePropagator& propagator, const ParticleConfig& config)
-    : BackEnd(propagator),
-      sample_(6, config.particles),
-      weights_(static_cast<std::size_t>(config.particles)) {}
+ParticleFilter::ParticleFilter(const StatePropagator& propagator, int particles)
+    : BackEnd(propagator), sample_(6, particles), weights_(static_cast<std::size_t>(particles)) {}
 
 void ParticleFilter::start(const FusionState& first) {
   random_.seed(1);

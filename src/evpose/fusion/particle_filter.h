@@ -16,7 +16,7 @@ namespace evpose {
 /// random numbers are the same in every run.
 class ParticleFilter : public BackEnd {
  public:
-  ParticleFilter(const StatePropagator& propagator, const ParticleConfig& config);
+  ParticleFilter(const StatePropagator& propagator, int particles);
 
   using BackEnd::start;
   void start(const FusionState& first) override;

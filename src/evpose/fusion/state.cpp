@@ -30,23 +30,6 @@ PoseInformation moved(const PoseInformation& m, const Pose& measured_at, const P
   return {J.transpose() * m.information * J, J.transpose() * (m.vector - m.information * d)};
 }
 
-PoseInformation linearised(std::span<const ContourOffset> contours, const Pose& measured_at, const Pose& at) {
-  PoseInformation out;
-  const Eigen::Matrix3d R = at.rotation();
-  const Pose T_at_measured = at.inverse() * measured_at;
-  for (const ContourOffset& c : contours) {
-    const Eigen::Vector3d point = T_at_measured * c.point_body;
-    Vector6d J;
-    J.head<3>() = R * c.across_body;
-    J.tail<3>() = point.cross(c.across_body);
-    const double rest = c.offset_px + c.across_body.dot(point - c.point_body);
-    out.information.selfadjointView<Eigen::Lower>().rankUpdate(J, c.weight);
-    out.vector += c.weight * rest * J;
-  }
-  out.information.triangularView<Eigen::StrictlyUpper>() = out.information.transpose();
-  return out;
-}
-
 double innovation(const Matrix6d& pose_covariance, const PoseInformation& m) {
   // z = H^-1 b has covariance P + H^-1, so that NIS = z^T (P + H^-1)^-1 z = b^T (H + H P H)^-1 b on H's
   // range.

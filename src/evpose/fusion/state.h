@@ -54,13 +54,9 @@ struct ContourOffset {
   Eigen::Vector3d across_body;  ///< distance across the contour in the image by the point, px/m
   double offset_px = 0;         ///< by which the point should move against `across_body`
   double weight = 0;            ///< px^-2
-  std::uint32_t piece = 0;      ///< of the contours, as the back end has them cut
+  std::uint32_t segment = 0;    ///< of the map, as the back end has it cut
   double sigma_m = 0;           ///< error of the contour that the map states
 };
-
-/// The sum over the contours, made anew at another pose: the points turn and shift with it exactly, their
-/// projection is that of where they were measured.
-PoseInformation linearised(std::span<const ContourOffset> contours, const Pose& measured_at, const Pose& at);
 
 /// Normalised innovation squared of a measurement relative to a predicted pose of this covariance, divided by
 /// its rank: about 1 when both know how good they are.

@@ -12,12 +12,18 @@ namespace evpose {
 
 using namespace error_state;
 
+namespace {
+
+/// How long a vehicle keeps one and the same motion, on which faults of the IMU's scale act.
+constexpr double kOneMotion_s = 0.3;
+/// White angular rate of a vehicle that nobody measures, rad/s/sqrt(Hz): its attitude drifts by 0.6 deg in 10
+/// ms.
+constexpr double kUnmeasuredGyroDensity = 0.1;
+
+}  // namespace
+
 StatePropagator::StatePropagator(MotionModel model, const FusionConfig& c, const ImuNoise& noise)
-    : model_(model),
-      gravity_map_(c.gravity_map),
-      noise_(noise),
-      scale_sigma_(c.imu_scale_sigma),
-      scale_s_(c.imu_scale_s) {
+    : model_(model), gravity_map_(c.gravity_map), noise_(noise), scale_sigma_(c.imu_scale_sigma) {
   double gyro_sigma = c.start_gyro_bias_sigma_rad_s, accel_sigma = c.start_accel_bias_sigma_m_s2;
   if (model_ == MotionModel::imu) {
     for (double* density :
@@ -36,7 +42,7 @@ StatePropagator::StatePropagator(MotionModel model, const FusionConfig& c, const
   }
   suspect_noise_ = noise_;
   suspect_noise_.accel_density = std::max(noise_.accel_density, c.cv_accel_density);
-  suspect_noise_.gyro_density = std::max(noise_.gyro_density, c.blind_gyro_density);
+  suspect_noise_.gyro_density = std::max(noise_.gyro_density, kUnmeasuredGyroDensity);
   blind_noise_ = suspect_noise_;
   blind_noise_.gyro_walk = std::max(noise_.gyro_walk, c.cv_angular_density);
   start_sigma_.segment<3>(kP).setConstant(c.start_position_sigma_m);
@@ -51,7 +57,7 @@ ImuNoise StatePropagator::noise_at(const Eigen::Vector3d& rate, const Eigen::Vec
   ImuNoise out = noise(trust);
   if (model_ != MotionModel::imu) return out;
   // As white noise of the strength that an error which lasts so long has at low frequencies.
-  const double factor = scale_sigma_ * std::sqrt(2 * scale_s_);
+  const double factor = scale_sigma_ * std::sqrt(2 * kOneMotion_s);
   out.gyro_density = std::hypot(out.gyro_density, factor * rate.norm());
   out.accel_density = std::hypot(out.accel_density, factor * (force.norm() - gravity_map_.norm()));
   return out;

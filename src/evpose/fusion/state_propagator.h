@@ -30,7 +30,7 @@ class StatePropagator {
   const ImuNoise& noise(ImuTrust trust = ImuTrust::good) const {
     return trust == ImuTrust::good ? noise_ : trust == ImuTrust::suspect ? suspect_noise_ : blind_noise_;
   }
-  /// ... and with what faults of scale and alignment add at this motion (body frame, rad/s, m/s^2).
+  /// The same with what faults of scale and alignment add at this motion (body frame, rad/s, m/s^2).
   ImuNoise noise_at(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, ImuTrust trust) const;
 
   /// The state at the start, with its configured uncertainty. The rate is used by constant velocity only.
@@ -51,7 +51,7 @@ class StatePropagator {
   MotionModel model_;
   Eigen::Vector3d gravity_map_;
   ImuNoise noise_, suspect_noise_, blind_noise_;
-  double scale_sigma_, scale_s_;
+  double scale_sigma_;
   Vector15d start_sigma_;
 };
 

@@ -32,16 +32,16 @@ Matrix15d information_of(Matrix15d covariance) {
 
 void Window::start(const FusionState& first) {
   nodes_.clear();
-  nodes_.push_back({first, Preintegration(first.gyro_bias, first.accel_bias), {}, first.nav.T_map_body, {}});
+  nodes_.push_back({first, Preintegration(first.gyro_bias, first.accel_bias), {}, first.nav.T_map_body});
   prior_at_ = first;
   prior_information_ = information_of(first.covariance);
   prior_vector_.setZero();
 }
 
 void Window::add(const Preintegration& motion, const FusionState& state, const PoseInformation& measurement,
-                 const Pose& measured_at, std::span<const ContourOffset> contours) {
+                 const Pose& measured_at) {
   EVPOSE_CHECK(!nodes_.empty());
-  nodes_.push_back({state, motion, measurement, measured_at, {contours.begin(), contours.end()}});
+  nodes_.push_back({state, motion, measurement, measured_at});
 }
 
 void Window::linearise(std::size_t count, bool newest_measured) {
@@ -56,9 +56,7 @@ void Window::linearise(std::size_t count, bool newest_measured) {
   for (std::size_t i = 0; i < count; ++i) {
     const Node& node = nodes_[i];
     if (newest_measured || i + 1 < count) {
-      const Pose& at = node.state.nav.T_map_body;
-      const PoseInformation m = node.contours.empty() ? moved(node.measurement, node.measured_at, at)
-                                                      : linearised(node.contours, node.measured_at, at);
+      const PoseInformation m = moved(node.measurement, node.measured_at, node.state.nav.T_map_body);
       chain_.diagonal(i).topLeftCorner<6, 6>() += m.information;
       chain_.vector(i).head<6>() += m.vector;
     }

@@ -23,9 +23,9 @@ class Window {
   /// The window holds `first` alone, with its covariance as prior; zero variances count as very small.
   void start(const FusionState& first);
   /// A new state, `motion` after the newest. `state` is where it is linearised first; `measurement` is
-  /// relative to `measured_at`. With `contours`, the measurement is linearised anew at each step.
+  /// relative to `measured_at`.
   void add(const Preintegration& motion, const FusionState& state, const PoseInformation& measurement,
-           const Pose& measured_at, std::span<const ContourOffset> contours = {});
+           const Pose& measured_at);
   /// Gauss-Newton on all states. False, and nothing changed, if the equations are not positive definite.
   bool optimise(int iterations);
   /// Marginalises all states before `t`; the newest always stays.
@@ -42,7 +42,6 @@ class Window {
     Preintegration motion;  ///< from the node before
     PoseInformation measurement;
     Pose measured_at;
-    std::vector<ContourOffset> contours;
   };
   /// The equations at the present states, of the first `count` nodes; the last one's measurement if asked.
   void linearise(std::size_t count, bool newest_measured);

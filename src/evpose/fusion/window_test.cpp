@@ -268,113 +268,6 @@ TEST(Window, OnALinearProblemTheNewestStateIsTheKalmanFilters) {
   EXPECT_NEAR(window.newest().covariance(0, 0) / P(0, 0), 1, 1e-4);
 }
 
-// --- tight coupling ---
-
-/// Contours about a pose: samples ahead of the body, each seen across one direction, with noise.
-std::vector<ContourOffset> contours_seen(const Pose& truth, const Pose& measured_at, bool parallel,
-                                         std::mt19937& random) {
-  std::uniform_real_distribution<double> side(-1, 1), depth(2, 4);
-  std::vector<ContourOffset> out;
-  for (int i = 0; i < 60; ++i) {
-    const double z = depth(random);
-    const Eigen::Vector3d point(side(random) * z, side(random) * z, z);  // body: z ahead
-    const Eigen::Vector2d n =
-        parallel ? Eigen::Vector2d(1, 0) : Eigen::Vector2d(std::cos(0.7 * i), std::sin(0.7 * i));
-    // Distance across the contour in an image of focal length 400 px, by the point.
-    const Eigen::Vector3d across = 400 / z * Eigen::Vector3d(n.x(), n.y(), -n.dot(point.head<2>()) / z);
-    const Eigen::Vector3d seen = truth.inverse() * (measured_at * point);
-    const double moved = across.dot(point - seen) + std::normal_distribution<double>(0, 0.3)(random);
-    out.push_back({point, across, moved, 1 / 0.09});
-  }
-  return out;
-}
-
-TEST(TightCoupling, DerivativesAreThoseOfTheDistances) {
-  std::mt19937 random(2);
-  const Pose at{so3::exp({0.3, -0.2, 1.1}), {1, 2, 3}};
-  const std::vector<ContourOffset> all = contours_seen(at, at, false, random);
-  Vector6d off;
-  off << 0.02, -0.01, 0.03, 0.01, 0.02, -0.015;
-  const Pose here = at.plus(off);
-  const auto cost = [&](const Pose& pose) {
-    double sum = 0;
-    for (const ContourOffset& c : all) {
-      const double rest =
-          c.offset_px + c.across_body.dot(pose.inverse() * (at * c.point_body) - c.point_body);
-      sum += 0.5 * c.weight * rest * rest;
-    }
-    return sum;
-  };
-  const PoseInformation m = linearised(all, at, here);
-  for (int i = 0; i < 6; ++i) {
-    const double h = 1e-6;
-    const Vector6d d = h * Vector6d::Unit(i);
-    const double slope = (cost(here.plus(d)) - cost(here.plus(-d))) / (2 * h);
-    EXPECT_NEAR(m.vector(i), -slope, 1e-5 * m.vector.norm()) << i;
-  }
-}
-
-TEST(TightCoupling, WhereItWasMeasuredItIsTheLooseOne) {
-  std::mt19937 random(3);
-  const Pose at{so3::exp({0.3, -0.2, 1.1}), {1, 2, 3}};
-  const std::vector<ContourOffset> all = contours_seen(at, at, false, random);
-  const PoseInformation sum = linearised(all, at, at);
-  // With small offsets the problem is linear, and both windows end in the same place.
-  Window loose(kGravity), tight(kGravity);
-  for (Window* w : {&loose, &tight}) w->start(some_state());
-  const Problem p = make_problem(6, 8);
-  for (std::size_t i = 0; i < p.motion.size(); ++i) {
-    const Pose& truth = p.truth[i + 1].nav.T_map_body;
-    Vector6d off;
-    off << draw(random, 1e-4), draw(random, 1e-4);
-    const Pose measured_at = truth.plus(off);
-    const std::vector<ContourOffset> seen = contours_seen(truth, measured_at, false, random);
-    FusionState next = p.truth[i + 1];
-    next.nav.T_map_body = measured_at;
-    loose.add(p.motion[i], next, linearised(seen, measured_at, measured_at), measured_at);
-    tight.add(p.motion[i], next, linearised(seen, measured_at, measured_at), measured_at, seen);
-  }
-  ASSERT_TRUE(loose.optimise(4));
-  ASSERT_TRUE(tight.optimise(4));
-  const Vector15d sigma = loose.newest().covariance.diagonal().cwiseSqrt();
-  EXPECT_LT(tight.newest().minus(loose.newest()).cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.02);
-  EXPECT_GT(sum.information.norm(), 0);
-}
-
-TEST(TightCoupling, ParallelContoursLeaveTheirDirectionFree) {
-  // All contours run along the body's y: nothing is known along it, whatever pose they are linearised at.
-  std::mt19937 random(4);
-  const Pose measured_at{Eigen::Quaterniond::Identity(), {0, 0, 0}};
-  Vector6d off;
-  off << 0.03, 0.05, -0.02, 0, 0, 0.02;
-  const std::vector<ContourOffset> seen = contours_seen(measured_at, measured_at, true, random);
-  for (const Pose& at : {measured_at, measured_at.plus(off)}) {
-    const Matrix6d H = linearised(seen, measured_at, at).information;
-    Vector6d d = Vector6d::Zero();
-    d.head<3>() = at.q * Eigen::Vector3d::UnitY();  // along the lines that were seen
-    EXPECT_LT(d.dot(H * d), 1e-12 * H.trace());
-    EXPECT_GT(H(0, 0), 1e3);
-  }
-  // In the window the variance along them stays what motion alone leaves of it; across, it falls.
-  Window window(kGravity);
-  FusionState first = some_state();
-  first.nav.T_map_body = measured_at;
-  first.nav.velocity.setZero();
-  window.start(first);
-  Preintegration sum({0, 0, 0}, {0, 0, 0});
-  for (int k = 0; k < 5; ++k)
-    sum.add({k * 4 * kNsPerMs, {0, 0, 0}, -kGravity}, {(k + 1) * 4 * kNsPerMs, {0, 0, 0}, -kGravity},
-            ImuNoise{});
-  FusionState next = sum.predict(first, kGravity);
-  next.t = 20 * kNsPerMs;
-  window.add(sum, next, linearised(seen, measured_at, measured_at), measured_at, seen);
-  ASSERT_TRUE(window.optimise(3));
-  const Matrix15d P = window.newest().covariance;
-  const double alone = 4e-6 + std::pow(0.05 * 0.02, 2);  // position and velocity of the start
-  EXPECT_GT(P(1, 1), 0.99 * alone);
-  EXPECT_LT(P(0, 0), 0.5 * alone);
-}
-
 // --- the back ends as a whole, on one noisy flight ---
 
 struct Flown {
@@ -382,11 +275,9 @@ struct Flown {
   FusionState end;
 };
 
-Flown fly(BackEndKind kind, MotionModel model, unsigned seed, int background_delay = 0) {
+Flown fly(BackEndKind kind, MotionModel model, unsigned seed) {
   FusionConfig config;
   config.kind = kind;
-  config.window.background = background_delay > 0;
-  config.window.delay = std::max(1, background_delay);
   config.imu_noise_scale = 1;
   config.imu_scale_sigma = 0;
   const ImuNoise noise;
@@ -479,21 +370,18 @@ TEST(BackEnds, AreTheSameInEveryRun) {
   }
 }
 
-TEST(BackEnds, TheBackgroundsResultIsUsedAtAFixedUpdate) {
-  for (const MotionModel model : {MotionModel::imu, MotionModel::constant_velocity}) {
-    const Flown at_once = fly(BackEndKind::graph, model, 7);
-    for (const int delay : {1, 2, 7}) {
-      const Flown later = fly(BackEndKind::graph, model, 7, delay),
-                  again = fly(BackEndKind::graph, model, 7, delay);
-      EXPECT_EQ(later.end.covariance, again.end.covariance) << "however long the thread takes";
-      EXPECT_EQ(later.end.nav.T_map_body.p, again.end.nav.T_map_body.p);
-      const Vector15d difference = later.end.minus(at_once.end);
-      EXPECT_LT(difference.cwiseAbs()
-                    .cwiseQuotient(at_once.end.covariance.diagonal().cwiseSqrt().cwiseMax(1e-9))
-                    .maxCoeff(),
-                0.1);
-      EXPECT_GT(difference.norm(), 0) << "it is used, and not at once";
-    }
+TEST(BackEnds, FurtherStatesAreTheFiltersAlone) {
+  for (const BackEndKind kind : {BackEndKind::graph, BackEndKind::particle}) {
+    FusionConfig config;
+    config.kind = kind;
+    EXPECT_EQ(resolved(config, true)->segment_offsets, SegmentOffsetUse::off);
+    config.calibration.rotation = true;
+    ASSERT_FALSE(resolved(config, true).ok());
+    EXPECT_NE(resolved(config, true).error().line().find("fusion.calibration"), std::string::npos);
+    config.calibration.rotation = false;
+    config.segment_offsets = SegmentOffsetUse::on;
+    ASSERT_FALSE(resolved(config, true).ok());
+    EXPECT_NE(resolved(config, true).error().line().find("fusion.segment_offsets"), std::string::npos);
   }
 }
 

@@ -63,11 +63,11 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   if (map.points.empty())
     return Error{map.source, "the map has no contour points", "give a map with contours"};
   if (auto ok = check_start(map, start, config.visible.far_m); !ok) return ok.error();
-  TrackerConfig resolved = config;
-  const auto offsets = settled(config.fusion, states_errors(map));
-  if (!offsets) return offsets.error();
-  resolved.fusion.slow.piece_offset = *offsets;
-  return std::unique_ptr<Tracker>(new Tracker(setup, resolved, start, std::move(clock)));
+  const auto fusion = resolved(config.fusion, states_errors(map));
+  if (!fusion) return fusion.error();
+  TrackerConfig resolved_config = config;
+  resolved_config.fusion = *fusion;
+  return std::unique_ptr<Tracker>(new Tracker(setup, resolved_config, start, std::move(clock)));
 }
 
 Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start,
@@ -91,8 +91,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       start_t_(start.t),
       last_update_(start.t),
       next_update_(start.t + from_seconds(1 / config.rate_hz)) {
-  if (config.fusion.slow.piece_offset == PieceOffsets::on)
-    offset_segments_ = cut_into_segments(*setup_.map, config.fusion.slow.piece_m).of_point;
+  if (config.fusion.segment_offsets == SegmentOffsetUse::on)
+    offset_segments_ = cut_into_segments(*setup_.map, config.fusion.segments.length_m).of_point;
   keep_time_surface(false);
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());

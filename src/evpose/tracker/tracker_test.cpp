@@ -284,9 +284,9 @@ TEST_F(BadInput, WhereContoursStandOffIsLearntFromTheirEvents) {
     p.sigma = 4e-3F;
   }
   setup_.map = std::make_shared<const ContourMap>(map);
-  config_.fusion.slow.piece_m = 5;  // each contour is off by one and the same along its length
-  const auto mean_error_m = [&](PieceOffsets offsets) {
-    config_.fusion.slow.piece_offset = offsets;
+  config_.fusion.segments.length_m = 5;  // each contour is off by one and the same along its length
+  const auto mean_error_m = [&](SegmentOffsetUse use) {
+    config_.fusion.segment_offsets = use;
     updates_.clear();
     fly(boxes(), 2.0);
     double sum = 0;
@@ -295,7 +295,7 @@ TEST_F(BadInput, WhereContoursStandOffIsLearntFromTheirEvents) {
       if (to_seconds(u.t - kStart_ns) > 0.2) sum += error_m(u), ++count;
     return sum / count;
   };
-  const double learnt = mean_error_m(PieceOffsets::automatic), plain = mean_error_m(PieceOffsets::off);
+  const double learnt = mean_error_m(SegmentOffsetUse::automatic), plain = mean_error_m(SegmentOffsetUse::off);
   EXPECT_LT(learnt, 0.6 * plain) << plain;
 }
 

@@ -18,13 +18,8 @@ const std::vector<Variant> kBackEnds{
     {"particle filter", true, {"fusion.kind=particle"}},
     {"EKF (full, the default)", true, {"fusion.kind=ekf"}},
     {"graph", true, {"fusion.kind=graph"}},
-    {"graph, tight", true, {"fusion.kind=graph", "fusion.coupling=tight"}},
-    {"graph, tight, in the background",
-     true,
-     {"fusion.kind=graph", "fusion.coupling=tight", "fusion.window.background=true"}},
-    {"EKF, gravity's direction", true, {"fusion.slow.gravity=true"}},
-    {"EKF, lasting offset", true, {"fusion.slow.pose_offset=true", "registration.correlation_time_s=0"}},
-    {"EKF, offsets of segments", true, {"fusion.slow.piece_offset=on"}},
+    {"EKF, gravity's direction", true, {"fusion.calibration.gravity=true"}},
+    {"EKF, offsets of segments", true, {"fusion.segment_offsets=on"}},
 };
 
 const std::vector<Variant> kAblation{

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/fusion/piece_ekf.h"
+#include "evpose/fusion/segment_offsets.h"
 
 #include <gtest/gtest.h>
 
@@ -11,16 +11,16 @@
 namespace evpose {
 namespace {
 
-constexpr double kPieceSigma_m = 1e-3, kStartSigma_m = 5e-3, kStartSigma_rad = 2e-3;
+constexpr double kOffsetSigma_m = 1e-3, kStartSigma_m = 5e-3, kStartSigma_rad = 2e-3;
 constexpr double kWeight_px2 = 400;  // a twentieth of a pixel
 
-FusionConfig some_config(int most_pieces = 100) {
+FusionConfig some_config(int most_segments = 100) {
   FusionConfig config;
   config.start_position_sigma_m = kStartSigma_m;
   config.start_rotation_sigma_rad = kStartSigma_rad;
-  config.slow.piece_offset = PieceOffsets::on;
-  config.slow.piece_sigma_m = kPieceSigma_m;
-  config.slow.most_pieces = most_pieces;
+  config.segment_offsets = SegmentOffsetUse::on;
+  config.segments.sigma_m = kOffsetSigma_m;
+  config.segments.most = most_segments;
   return config;
 }
 
@@ -32,17 +32,18 @@ NavState some_state() {
   return s;
 }
 
-/// Contour samples around the body, several of each piece, and the direction in which their piece stands off.
-std::vector<ContourOffset> some_contours(int pieces) {
+/// Contour samples around the body, several of each segment, and the direction in which their segment stands
+/// off.
+std::vector<ContourOffset> some_contours(int segments) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> place(-1, 1);
   std::vector<ContourOffset> contours;
-  for (int piece = 0; piece < pieces; ++piece) {
+  for (int segment = 0; segment < segments; ++segment) {
     const Eigen::Vector3d middle(2 * place(random), 2 * place(random), 3 + place(random));
     const Eigen::Vector3d across = Eigen::Vector3d(place(random), place(random), 0).normalized();
     for (int k = 0; k < 4; ++k)
       contours.push_back({middle + 0.05 * k * Eigen::Vector3d(-across.y(), across.x(), 0), 200.0 * across, 0,
-                          kWeight_px2, static_cast<std::uint32_t>(10 * piece)});
+                          kWeight_px2, static_cast<std::uint32_t>(10 * segment)});
   }
   return contours;
 }
@@ -53,33 +54,43 @@ Vector6d by_pose(const ContourOffset& contour, const Pose& at) {
   return J;
 }
 
-/// The contours, and what a registration at the filter's pose makes of them.
-void measure(BackEnd& filter, const std::vector<ContourOffset>& contours) {
-  const Pose& at = filter.state().nav.T_map_body;
-  filter.update(linearised(contours, at, at), contours);
+/// The sum over the contours, as a registration makes it.
+PoseInformation summed(const std::vector<ContourOffset>& contours, const Pose& at) {
+  PoseInformation sum;
+  for (const ContourOffset& contour : contours) {
+    const Vector6d J = by_pose(contour, at);
+    sum.information += contour.weight * J * J.transpose();
+    sum.vector += contour.weight * contour.offset_px * J;
+  }
+  return sum;
 }
 
-TEST(PieceEkf, RepeatedMeasurementsGiveTheBatchSolutionOverPoseAndOffsets) {
-  constexpr int kPieces = 9, kUpdates = 5;
-  PieceEkf filter(some_propagator(), some_config().slow);
+/// The contours, and what a registration at the filter's pose makes of them.
+void measure(BackEnd& filter, const std::vector<ContourOffset>& contours) {
+  filter.update(summed(contours, filter.state().nav.T_map_body), contours);
+}
+
+TEST(SegmentOffsets, RepeatedMeasurementsGiveTheBatchSolutionOverPoseAndOffsets) {
+  constexpr int kSegments = 9, kUpdates = 5;
+  Ekf filter(some_propagator(), some_config());
   filter.start(0, some_state(), {0, 0, 0});
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   const Pose first = some_state().T_map_body;
 
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(6 + kPieces, 6 + kPieces);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(6 + kSegments, 6 + kSegments);
   information.diagonal() << Eigen::Vector3d::Constant(1 / (kStartSigma_m * kStartSigma_m)),
       Eigen::Vector3d::Constant(1 / (kStartSigma_rad * kStartSigma_rad)),
-      Eigen::VectorXd::Constant(kPieces, 1 / (kPieceSigma_m * kPieceSigma_m));
-  Eigen::VectorXd vector = Eigen::VectorXd::Zero(6 + kPieces);
+      Eigen::VectorXd::Constant(kSegments, 1 / (kOffsetSigma_m * kOffsetSigma_m));
+  Eigen::VectorXd vector = Eigen::VectorXd::Zero(6 + kSegments);
   for (int update = 0; update < kUpdates; ++update) {
-    auto contours = some_contours(kPieces);
+    auto contours = some_contours(kSegments);
     for (ContourOffset& contour : contours) {
       // What the contours ask for, from the first pose, is small, so that the turned axes do not matter.
       const double asked = 0.002 * normal(random);
-      Eigen::VectorXd row = Eigen::VectorXd::Zero(6 + kPieces);
+      Eigen::VectorXd row = Eigen::VectorXd::Zero(6 + kSegments);
       row.head<6>() = by_pose(contour, first);
-      row(6 + contour.piece / 10) = -contour.across_body.norm();
+      row(6 + contour.segment / 10) = -contour.across_body.norm();
       information += contour.weight * row * row.transpose();
       vector += contour.weight * asked * row;
       // The filter is told from where it stands.
@@ -97,22 +108,23 @@ TEST(PieceEkf, RepeatedMeasurementsGiveTheBatchSolutionOverPoseAndOffsets) {
                 .cwiseAbs()
                 .maxCoeff(),
             2e-3);
-  ASSERT_EQ(filter.pieces().size(), kPieces);
-  for (int i = 0; i < kPieces; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    EXPECT_NEAR(filter.pieces()[k].offset_m, expected(6 + i), 2e-3 * filter.sigma_m(k)) << i;
-    EXPECT_NEAR(filter.sigma_m(k), std::sqrt(covariance(6 + i, 6 + i)), 2e-3 * filter.sigma_m(k)) << i;
+  ASSERT_EQ(filter.segments().size(), kSegments);
+  for (int i = 0; i < kSegments; ++i) {
+    const SegmentOffsets::Segment& segment = filter.segments()[static_cast<std::size_t>(i)];
+    const double sigma_m = std::sqrt(filter.filter().covariance(segment.block)(0, 0));
+    EXPECT_NEAR(segment.offset_m, expected(6 + i), 2e-3 * sigma_m) << i;
+    EXPECT_NEAR(sigma_m, std::sqrt(covariance(6 + i, 6 + i)), 2e-3 * sigma_m) << i;
   }
 }
 
-TEST(PieceEkf, KnowsThatAMapWithPiecesOffNeverTellsMoreThanThePiecesAllow) {
-  constexpr int kPieces = 12, kRuns = 300, kUpdates = 40;
+TEST(SegmentOffsets, AMapThatIsOffTellsNoMoreThanItsSegmentsAllow) {
+  constexpr int kSegments = 12, kRuns = 300, kUpdates = 40;
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   double own = 0, plain = 0;
   const StatePropagator propagator = some_propagator();
   for (int run = 0; run < kRuns; ++run) {
-    PieceEkf with(propagator, some_config().slow);
+    Ekf with(propagator, some_config());
     Ekf without(propagator);
     NavState start = some_state();
     Vector6d off;
@@ -120,15 +132,15 @@ TEST(PieceEkf, KnowsThatAMapWithPiecesOffNeverTellsMoreThanThePiecesAllow) {
     start.T_map_body = start.T_map_body.plus(off);
     with.start(0, start, {0, 0, 0});
     without.start(0, start, {0, 0, 0});
-    std::vector<double> offsets(kPieces);
-    for (double& offset : offsets) offset = kPieceSigma_m * normal(random);
+    std::vector<double> offsets(kSegments);
+    for (double& offset : offsets) offset = kOffsetSigma_m * normal(random);
     for (int update = 0; update < kUpdates; ++update)
       for (BackEnd* filter : {static_cast<BackEnd*>(&with), static_cast<BackEnd*>(&without)}) {
-        auto contours = some_contours(kPieces);
+        auto contours = some_contours(kSegments);
         const Vector6d wrong = some_state().T_map_body.minus(filter->state().nav.T_map_body);
         for (ContourOffset& contour : contours)
           contour.offset_px = by_pose(contour, filter->state().nav.T_map_body).dot(wrong) -
-                              contour.across_body.norm() * offsets[contour.piece / 10] +
+                              contour.across_body.norm() * offsets[contour.segment / 10] +
                               normal(random) / std::sqrt(contour.weight);
         measure(*filter, contours);
       }
@@ -140,16 +152,16 @@ TEST(PieceEkf, KnowsThatAMapWithPiecesOffNeverTellsMoreThanThePiecesAllow) {
     plain += nees(without) / kRuns;
   }
   EXPECT_NEAR(own, 1, 0.12);
-  EXPECT_GT(plain, 20) << "or the pieces' offsets are too small to matter here";
+  EXPECT_GT(plain, 20) << "or the segments' offsets are too small to matter here";
 }
 
-TEST(PieceEkf, ThePieceNotSeenForLongestGivesWay) {
-  PieceEkf filter(some_propagator(), some_config(2).slow);
+TEST(SegmentOffsets, TheSegmentNotSeenForLongestGivesWay) {
+  Ekf filter(some_propagator(), some_config(2));
   filter.start(0, some_state(), {0, 0, 0});
   const auto contours = some_contours(3);
   const auto numbers = [&] {
     std::vector<std::uint32_t> all;
-    for (const auto& piece : filter.pieces()) all.push_back(piece.number);
+    for (const auto& segment : filter.segments()) all.push_back(segment.number);
     return all;
   };
   const auto see = [&](std::size_t from, std::size_t count) {
@@ -170,17 +182,14 @@ TEST(PieceEkf, ThePieceNotSeenForLongestGivesWay) {
   EXPECT_TRUE(filter.state().covariance.allFinite());
 }
 
-TEST(PieceEkf, IsTheFilterOfMapsThatStateErrorsUnlessMoreIsAskedFor) {
+TEST(SegmentOffsets, AreStatesWhereTheMapStatesErrorsBesideAnyCalibration) {
   FusionConfig config;
-  EXPECT_EQ(*settled(config, true), PieceOffsets::on);
-  EXPECT_EQ(*settled(config, false), PieceOffsets::off);
+  EXPECT_EQ(resolved(config, true)->segment_offsets, SegmentOffsetUse::on);
+  EXPECT_EQ(resolved(config, false)->segment_offsets, SegmentOffsetUse::off);
   config.calibration.rotation = true;
-  EXPECT_EQ(*settled(config, true), PieceOffsets::off);
-  config.slow.piece_offset = PieceOffsets::on;
-  ASSERT_FALSE(settled(config, true).ok());
-  EXPECT_NE(settled(config, true).error().line().find("fusion.slow.piece_offset"), std::string::npos);
-  config.calibration.rotation = false;
-  EXPECT_EQ(*settled(config, false), PieceOffsets::on);
+  EXPECT_EQ(resolved(config, true)->segment_offsets, SegmentOffsetUse::on);
+  config.segment_offsets = SegmentOffsetUse::on;
+  EXPECT_EQ(resolved(config, false)->segment_offsets, SegmentOffsetUse::on);
 }
 
 }  // namespace

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/fusion/calibration_states.h"
+
+#include <cmath>
+
+namespace evpose {
+namespace {
+
+/// Without changes of velocity and of angular rate beyond these, over half a second, every error of the
+/// calibration is the same as one of the pose.
+constexpr double kLeastVelocity_m_s = 0.05, kLeastRate_rad_s = 0.05, kExcitation_s = 0.5;
+
+}  // namespace
+
+CalibrationStates::CalibrationStates(const CalibrationConfig& config, const Pose& T_body_cam)
+    : config_(config), T_body_cam_(T_body_cam) {}
+
+void CalibrationStates::start(ErrorStateFilter& filter) {
+  const FusionState& state = filter.state();
+  motion_mean_.head<3>() = state.nav.velocity;
+  motion_mean_.tail<3>() = state.angular_rate;
+  motion_square_ = motion_mean_.cwiseAbs2();
+  judged_ = state.t;
+  if (started_) {
+    for (const PoseShift& shift : pose_shifts(state)) {
+      ErrorStateFilter::ByState by_block = ErrorStateFilter::ByState::Zero(15, shift.by_block.cols());
+      by_block.topRows<6>() = -shift.by_block;
+      filter.add_effect(shift.block, by_block);
+    }
+    return;
+  }
+  started_ = true;
+  const auto add = [&](int size, double sigma) {
+    return filter.add_block(Eigen::VectorXd::Constant(size, sigma));
+  };
+  if (config_.time_offset) time_ = add(1, config_.start_time_sigma_s);
+  if (config_.rotation) rotation_ = add(3, config_.start_rotation_sigma_rad);
+  if (config_.translation) translation_ = add(3, config_.start_translation_sigma_m);
+  if (config_.gravity) gravity_ = add(2, config_.start_gravity_sigma_rad);
+  state_sigmas(filter);
+}
+
+void CalibrationStates::propagate(ErrorStateFilter& filter, const Eigen::Vector3d& gravity_map,
+                                  double dt_s) const {
+  if (!gravity_) return;
+  const Eigen::Matrix<double, 3, 2> by_tilt = -so3::hat(gravity_map).leftCols<2>();
+  ErrorStateFilter::ByState by_block = ErrorStateFilter::ByState::Zero(15, 2);
+  by_block.middleRows<3>(error_state::kV) = dt_s * by_tilt;
+  by_block.middleRows<3>(error_state::kP) = 0.5 * dt_s * dt_s * by_tilt;
+  filter.add_effect(*gravity_, by_block);
+}
+
+void CalibrationStates::judge_excitation(ErrorStateFilter& filter) {
+  const FusionState& state = filter.state();
+  const double share = 1 - std::exp(-to_seconds(state.t - judged_) / kExcitation_s);
+  judged_ = state.t;
+  Vector6d now;
+  now.head<3>() = state.nav.velocity;
+  now.tail<3>() = state.angular_rate;
+  motion_mean_ += share * (now - motion_mean_);
+  motion_square_ += share * (now.cwiseAbs2() - motion_square_);
+  const Vector6d variance = motion_square_ - motion_mean_.cwiseAbs2();
+  const auto below = [](double sum, double least) { return !(sum > least * least); };
+  found_.frozen = below(variance.head<3>().sum(), kLeastVelocity_m_s) &&
+                  below(variance.tail<3>().sum(), kLeastRate_rad_s);
+  for (const auto& block : {time_, rotation_, translation_})
+    if (block) filter.set_considered(*block, found_.frozen);
+}
+
+std::vector<PoseShift> CalibrationStates::pose_shifts(const FusionState& state) const {
+  std::vector<PoseShift> shifts;
+  const Eigen::Matrix3d R = state.nav.T_map_body.rotation();
+  const auto add = [&](BlockId block, Eigen::Index size) -> auto& {
+    shifts.push_back({block, decltype(PoseShift::by_block)::Zero(6, size)});
+    return shifts.back().by_block;
+  };
+  if (time_) {
+    auto& by_time = add(*time_, 1);
+    by_time.topRows<3>() = state.nav.velocity;
+    by_time.bottomRows<3>() = state.angular_rate;
+  }
+  // The camera's pose is what is seen; the body's follows from it by the given T_body_cam.
+  if (rotation_) {
+    auto& by_rotation = add(*rotation_, 3);
+    by_rotation.topRows<3>() = R * so3::hat(T_body_cam_.p + found_.shift);
+    by_rotation.bottomRows<3>().setIdentity();
+  }
+  if (translation_) add(*translation_, 3).topRows<3>() = R;
+  return shifts;
+}
+
+void CalibrationStates::apply_corrections(const ErrorStateFilter& filter, Eigen::Vector3d* gravity_map) {
+  if (time_) found_.time_offset_s += filter.correction(*time_)(0);
+  if (rotation_) {
+    const Eigen::Vector3d turn = filter.correction(*rotation_);
+    found_.turn = (so3::exp(turn) * found_.turn).normalized();
+  }
+  if (translation_) found_.shift += filter.correction(*translation_);
+  if (gravity_) {
+    const Eigen::Vector2d tilt = filter.correction(*gravity_);
+    found_.gravity_tilt_rad += tilt;
+    *gravity_map = so3::exp({tilt.x(), tilt.y(), 0}) * *gravity_map;
+  }
+  state_sigmas(filter);
+}
+
+void CalibrationStates::state_sigmas(const ErrorStateFilter& filter) {
+  const auto sigma = [&](BlockId block) -> Eigen::VectorXd {
+    return filter.covariance(block).diagonal().cwiseMax(0).cwiseSqrt();
+  };
+  if (time_) found_.time_sigma_s = sigma(*time_)(0);
+  if (rotation_) found_.turn_sigma_rad = sigma(*rotation_);
+  if (translation_) found_.shift_sigma_m = sigma(*translation_);
+  if (gravity_) found_.gravity_sigma_rad = sigma(*gravity_);
+}
+
+}  // namespace evpose

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "evpose/fusion/back_end.h"
+#include "evpose/fusion/error_state_filter.h"
+
+namespace evpose {
+
+/// The calibration as blocks of a filter: time offset between IMU and camera, rotation and translation of the
+/// camera in the body, and the direction of gravity in the map. While the motion cannot tell the first three
+/// from an error of the pose they are considered, not estimated.
+class CalibrationStates {
+ public:
+  CalibrationStates(const CalibrationConfig& config, const Pose& T_body_cam);
+
+  /// To be called when the filter's state was set anew. At first it adds the blocks. Later the camera has
+  /// found the pose: then the body's is as wrong as the calibration, and correlated with it.
+  void start(ErrorStateFilter& filter);
+  /// What a wrong direction of gravity does to the state within `dt_s`.
+  void propagate(ErrorStateFilter& filter, const Eigen::Vector3d& gravity_map, double dt_s) const;
+  /// Freezes or frees the blocks by how much the motion has changed of late.
+  void judge_excitation(ErrorStateFilter& filter);
+  /// How the pose that the camera sees depends on the blocks.
+  std::vector<PoseShift> pose_shifts(const FusionState& state) const;
+  /// Takes over what the filter's last update found; turns the direction of gravity likewise.
+  void apply_corrections(const ErrorStateFilter& filter, Eigen::Vector3d* gravity_map);
+
+  const Calibration& calibration() const { return found_; }
+
+ private:
+  void state_sigmas(const ErrorStateFilter& filter);
+
+  CalibrationConfig config_;
+  Pose T_body_cam_;  ///< as given
+  Calibration found_;
+  bool started_ = false;
+  std::optional<BlockId> time_, rotation_, translation_, gravity_;
+  // Mean and mean square of (velocity, rate) over the last half second.
+  Vector6d motion_mean_ = Vector6d::Zero(), motion_square_ = Vector6d::Zero();
+  TimeNs judged_ = 0;
+};
+
+}  // namespace evpose

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/fusion/fusion_config.h"
+
+#include "evpose/core/config.h"
+
+namespace evpose {
+
+void describe(ConfigTable& table, FusionConfig& c) {
+  table.add(
+      "kind", c.kind,
+      {{"ekf", BackEndKind::ekf}, {"graph", BackEndKind::graph}, {"particle", BackEndKind::particle}},
+      "framework of the fusion: error-state Kalman filter, factor graph over a window, particle filter");
+  table.add("gravity_x", c.gravity_map.x(), "m/s^2", "gravity in the map frame", {-20, 20});
+  table.add("gravity_y", c.gravity_map.y(), "m/s^2", "gravity in the map frame", {-20, 20});
+  table.add("gravity_z", c.gravity_map.z(), "m/s^2", "gravity in the map frame", {-20, 20});
+  table.add("imu_noise_scale", c.imu_noise_scale, "", "factor on the IMU's noise densities", {0.01, 1000});
+  table.add("start_position_sigma_m", c.start_position_sigma_m, "m", "error of the start position, 1 sigma",
+            {1e-6, 10});
+  table.add("start_rotation_sigma_rad", c.start_rotation_sigma_rad, "rad",
+            "error of the start attitude, 1 sigma", {1e-6, 1});
+  table.group("calibration", c.calibration);
+  table.add(
+      "segment_offsets", c.segment_offsets,
+      {{"off", SegmentOffsetUse::off}, {"on", SegmentOffsetUse::on}, {"auto", SegmentOffsetUse::automatic}},
+      "estimate the offset of each map segment in view (ekf); auto: of maps that state errors");
+  table.add("window_s", c.window_s, "s", "graph: states older than this are marginalised", {1e-3, 10});
+  table.add("particles", c.particles, "", "particle filter: number of particles", {20, 1e6});
+}
+
+void describe(ConfigTable& table, CalibrationConfig& c) {
+  table.add("time_offset", c.time_offset, "estimate the time offset of the IMU against the camera (ekf)");
+  table.add("rotation", c.rotation, "estimate the rotation of the camera in the body (ekf)");
+  table.add("translation", c.translation, "estimate the place of the camera in the body (ekf)");
+  table.add("gravity", c.gravity, "estimate the direction of gravity in the map (ekf)");
+}
+
+Expected<FusionConfig> resolved(const FusionConfig& config, bool map_states_errors) {
+  FusionConfig out = config;
+  const bool filter = config.kind == BackEndKind::ekf;
+  if (!filter && config.calibration.any())
+    return Error{"fusion.kind", "only ekf estimates the calibration",
+                 "set fusion.kind=ekf, or all of fusion.calibration to false"};
+  if (!filter && config.segment_offsets == SegmentOffsetUse::on)
+    return Error{"fusion.kind", "only ekf estimates offsets of map segments",
+                 "set fusion.kind=ekf, or fusion.segment_offsets=off"};
+  if (config.segment_offsets == SegmentOffsetUse::automatic)
+    out.segment_offsets = filter && map_states_errors ? SegmentOffsetUse::on : SegmentOffsetUse::off;
+  return out;
+}
+
+}  // namespace evpose

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/fusion/joint_measurement.h"
+
+#include <algorithm>
+
+#include "evpose/core/error.h"
+
+namespace evpose {
+
+void JointMeasurement::start(const PoseInformation& pose, std::span<const PoseShift> shifts) {
+  shifts_.assign(shifts.begin(), shifts.end());
+  for (const Block& block : blocks_) place_[static_cast<std::size_t>(block.id)] = -1;
+  blocks_.clear();
+  size_ = 6;
+  information_.topLeftCorner<6, 6>() = pose.information;
+  vector_.head<6>() = pose.vector;
+}
+
+int JointMeasurement::place_of(BlockId id, int size) {
+  const auto number = static_cast<std::size_t>(id);
+  if (number >= place_.size()) place_.resize(number + 1, -1);
+  if (place_[number] >= 0) return place_[number];
+  place_[number] = static_cast<int>(blocks_.size());
+  blocks_.push_back({id, size_, size});
+  const int first = size_;
+  size_ += size;
+  if (size_ > information_.rows()) {
+    const Eigen::Index room = std::max<Eigen::Index>(size_, 2 * information_.rows());
+    information_.conservativeResize(room, room);
+    vector_.conservativeResize(room);
+  }
+  information_.block(first, 0, size, size_).setZero();
+  information_.block(0, first, size_, size).setZero();
+  vector_.segment(first, size).setZero();
+  return place_[number];
+}
+
+void JointMeasurement::add(const BlockSample& s) {
+  vector_.head<6>() += s.weight * (s.residual - s.residual_in_pose) * s.by_pose;
+  for (const BlockRow& row : s.rows) {
+    const auto n = static_cast<int>(row.by_block.size());
+    const Block here = blocks_[static_cast<std::size_t>(place_of(row.block, n))];
+    EVPOSE_CHECK(here.size == n);
+    const auto mixed = information_.block(0, here.at, 6, n);
+    information_.block(0, here.at, 6, n) = mixed + s.weight * s.by_pose * row.by_block;
+    information_.block(here.at, 0, n, 6) = mixed.transpose();
+    vector_.segment(here.at, n) += s.weight * s.residual * row.by_block.transpose();
+    for (const BlockRow& other : s.rows) {
+      const auto m = static_cast<int>(other.by_block.size());
+      const Block there = blocks_[static_cast<std::size_t>(place_of(other.block, m))];
+      information_.block(here.at, there.at, n, m) += s.weight * row.by_block.transpose() * other.by_block;
+    }
+  }
+}
+
+}  // namespace evpose

@@ -18,12 +18,14 @@ TIGHTER = {"Tracker::update": 25}
 
 # What is not code: comments, strings (raw ones first), characters (but no digit separators), directives.
 NOT_CODE = re.compile(
-    r"""//[^\n]*|/\*.*?\*/|R"(?P<fence>[^()\s\\]*)\(.*?\)(?P=fence)"|"(?:\\.|[^"\\\n])*"|(?<![0-9A-Za-z_])'(?:\\.|[^'\\\n])+'"""
-    r"""|^[ \t]*\#(?:\\\n|[^\n])*""", re.DOTALL | re.MULTILINE)
+    r"""//[^\n]*|/\*.*?\*/|R"(?P<fence>[^()\s\\]*)\(.*?\)(?P=fence)"|"(?:\\.|[^"\\\n])*"|"""
+    r"""(?<![0-9A-Za-z_])'(?:\\.|[^'\\\n])+'|^[ \t]*\#(?:\\\n|[^\n])*""", re.DOTALL | re.MULTILINE)
 ATTRIBUTE = re.compile(r"\[\[.*?\]\]|\b(?:alignas|__attribute__)\s*\((?:[^()]|\([^()]*\))*\)")
 OPERATOR = re.compile(r"\boperator\s*(?:\(\s*\)|\[\s*\]|[^\s\w(]+)")
 TYPE = re.compile(r"\b(class|struct|union)\b")
 SCOPE = re.compile(r"\bnamespace(?:\s+[\w:]+)?\s*$|\bextern\s*\"\s*\"\s*$")
+NAME = re.compile(r"((?:[A-Za-z_]\w*(?:<[^<>]*>)?::)*~?(?:operator\s*(?:\(\s*\)|[^\s(]+)|[A-Za-z_]\w*)(?:<[^<>]*>)?)"
+                  r"\s*(?:\(|=|$)")
 LABEL = re.compile(r"^\s*(?:public|protected|private)\s*:(?!:)")
 
 
@@ -81,7 +83,7 @@ def kind_of(head):
 def name_of(head):
     """The name of the function that `head` begins, with its class as it is written there."""
     head = without_template(ATTRIBUTE.sub("", head))
-    match = re.search(r"((?:[A-Za-z_]\w*(?:<[^<>]*>)?::)*~?(?:operator\s*(?:\(\s*\)|[^\s(]+)|[A-Za-z_]\w*)(?:<[^<>]*>)?)\s*(?:\(|=|$)", head)
+    match = NAME.search(head)
     if match and match[1].startswith(("TEST", "TYPED_TEST", "BENCHMARK")):
         return re.sub(r"\s*,\s*", ".", head[match.end():head.rindex(")")].strip())
     return re.sub(r"<[^<>]*>", "", match[1]) if match else "?"

@@ -65,7 +65,8 @@ int g();
 """), [])
 
     def test_constructors_with_braces_in_their_initialisers(self):
-        self.assertEqual(self.found("C::C()\n    : a_{1},\n      b_(f({2})),\n      c_{} {\n  go();\n}\n"), [("C::C", 6)])
+        self.assertEqual(self.found("C::C()\n    : a_{1},\n      b_(f({2})),\n      c_{} {\n  go();\n}\n"),
+                         [("C::C", 6)])
 
     def test_lambdas_count_to_their_function_and_alone_where_they_stand_alone(self):
         self.assertEqual(self.found("void f() {\n  const auto g = [](int x) {\n    return x;\n  };\n}\n"), [("f", 5)])

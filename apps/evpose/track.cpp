@@ -50,6 +50,10 @@ void add_track(CLI::App& app, std::function<int()>& run) {
       ->check(CLI::Range(0.0, 10.0));
   request->output = "run";
   command->add_option("-o,--output", request->output, "run folder")->capture_default_str();
+  command->add_option("--learn-map", request->learnt_map,
+                      "map.h5 to write: the map with the signs of contrast that the events have told");
+  command->add_option("--preset", request->preset,
+                      "settings to begin with: paper, the method of EV-Pose in place of the defaults");
   command->add_option("--config", request->config_file, "YAML file with settings");
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   auto* dump_flag = command->add_flag("--dump-config", *dump, "print all settings and stop");

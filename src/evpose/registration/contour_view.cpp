@@ -52,6 +52,7 @@ void project_contours(const ContourView& view, std::span<const std::uint32_t> po
     ContourSample s;
     s.pixel = *pixel;
     s.normal_px = normal;
+    s.normal_side = across.dot(R * point.normal.cast<double>()) < 0 ? -1 : 1;
     s.speed_px_s = normal.dot(flow);
     // n.(u(t - a) - u(t)) = -s1 a + s2 a^2, through the projection of then.
     if (span_s > 0)

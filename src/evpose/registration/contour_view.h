@@ -17,6 +17,7 @@ namespace evpose {
 struct ContourSample {
   Eigen::Vector2d pixel;        ///< at the time of the update, predicted
   Eigen::Vector2d normal_px;    ///< unit, across the contour
+  int normal_side = 1;          ///< +1 if `normal_px` points as the image of the map's normal does, else -1
   double speed_px_s = 0;        ///< s1: normal . velocity of the contour in the image
   double curvature_px_s2 = 0;   ///< s2: normal . (u(t - a) - u(t)) = -s1 a + s2 a^2 for age a
   Vector6d jacobian;            ///< derivative of an event's signed distance by the pose perturbation

@@ -7,7 +7,8 @@
 namespace evpose {
 namespace {
 
-constexpr double kDoubt_px2 = 20;  // of a step of none, before anything is seen
+constexpr double kDoubt_px2 = 20;  // of a step of none, or of the map's sign, before anything is seen
+constexpr double kSeedSteps = 1;   // of the threshold, that a map's sign stands for
 
 // Law of the edge delay, as measured in simulated flights: by contrast in steps n of the threshold,
 // min(largest, least + by_contrast / n).
@@ -20,14 +21,26 @@ constexpr double kLargestDelay_px = 0.16;
 ContrastMemory::ContrastMemory(std::uint32_t segments, double threshold)
     : threshold_(threshold), segments_(segments) {}
 
+void ContrastMemory::seed(std::uint32_t segment, int sign) {
+  if (sign == 0) return;
+  segments_[segment].net += static_cast<float>(sign * kSeedSteps * kDoubt_px2);
+  segments_[segment].seeded = true;
+}
+
 void ContrastMemory::sweep(std::uint32_t segment, double area_px2) {
   Segment& s = segments_[segment];
   s.swept_px2 += static_cast<float>(area_px2);
   if (s.swept_px2 > kMemory_px2) s.swept_px2 *= 0.5F, s.net *= 0.5F;
 }
 
-void ContrastMemory::count(std::uint32_t segment, int sign) {
-  segments_[segment].net += static_cast<float>(sign);
+void ContrastMemory::count(std::uint32_t segment, int net) {
+  segments_[segment].net += static_cast<float>(net);
+}
+
+int ContrastMemory::map_contrast(std::uint32_t segment) const {
+  const double n = steps(segment);
+  if (!known(segment) || std::abs(n) < kSureSteps) return 0;
+  return n > 0 ? -1 : 1;
 }
 
 double ContrastMemory::steps(std::uint32_t segment) const {
@@ -38,8 +51,8 @@ double ContrastMemory::steps(std::uint32_t segment) const {
 ContrastMemory::EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
   const double n = std::abs(steps(segment));
   const double delay =
-      known(segment) ? std::min(kLargestDelay_px, kLeastDelay_px + kDelayByContrast_px / std::max(n, 1e-3))
-                     : kUnknownDelay_px;
+      measured(segment) ? std::min(kLargestDelay_px, kLeastDelay_px + kDelayByContrast_px / std::max(n, 1e-3))
+                        : kUnknownDelay_px;
   // Where the logarithm is halfway between both sides, of a pixel's width; s: square root of their ratio.
   const double s = std::exp(0.5 * n * threshold_);
   const double towards_dark = 0.5 - 1 / (1 + s);

@@ -14,15 +14,24 @@ class ContrastMemory {
   /// `threshold`: of the camera, in log luminance.
   ContrastMemory(std::uint32_t segments, double threshold);
 
+  /// What the map says of a step's sign, -1, 0 or +1 as steps(). It counts until events have told more.
+  void seed(std::uint32_t segment, int sign);
   /// The segment has swept so much of the image.
   void sweep(std::uint32_t segment, double area_px2);
-  /// An event near the segment: +1 if it is on and the contour moves along its normal, or off and against it.
-  void count(std::uint32_t segment, int sign);
+  /// On less off events near the segment, as it would be if its normal pointed along its motion.
+  void count(std::uint32_t segment, int net);
 
-  /// Steps of the threshold across the contour, positive if it is darker in front of it, where its image
-  /// normal points; 0 as long as little is known.
+  /// Steps of the threshold across the contour, positive if it is darker in front of it, where the map's
+  /// normal points; near 0 as long as little is known.
   double steps(std::uint32_t segment) const;
-  bool known(std::uint32_t segment) const { return segments_[segment].swept_px2 > kLittle_px2; }
+  /// Events or the map have told the sign.
+  bool known(std::uint32_t segment) const { return segments_[segment].seeded || measured(segment); }
+  /// Events have told the step.
+  bool measured(std::uint32_t segment) const { return segments_[segment].swept_px2 > kLittle_px2; }
+  /// -1, 0 (not known or no step to speak of) or +1, as ContourPoint::contrast: +1 if it is brighter where
+  /// the map's normal points.
+  int map_contrast(std::uint32_t segment) const;
+  std::uint32_t segments() const { return static_cast<std::uint32_t>(segments_.size()); }
 
   /// How far behind the contour its events lie, px along the motion. Late by a part of a threshold: the pixel
   /// was on average half a threshold short of its first event. And displaced towards the dark side: a pixel's
@@ -32,6 +41,7 @@ class ContrastMemory {
   };
   EdgeDelay edge_delay(std::uint32_t segment) const;
 
+  static constexpr double kSureSteps = 0.3;         ///< contrast from which on a sign is relied on
   static constexpr double kUnknownDelay_px = 0.10;  ///< of contours that have hardly moved yet
   static constexpr double kMemory_px2 = 600;        ///< area swept until what was learnt counts half
 
@@ -39,6 +49,7 @@ class ContrastMemory {
   static constexpr double kLittle_px2 = 40;
   struct Segment {
     float net = 0, swept_px2 = 0;
+    bool seeded = false;
   };
   double threshold_;
   std::vector<Segment> segments_;

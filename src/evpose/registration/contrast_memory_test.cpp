@@ -35,6 +35,22 @@ TEST(ContrastMemory, ForgetsWhatNoLongerHolds) {
   EXPECT_LT(memory.steps(0), -2);
 }
 
+TEST(ContrastMemory, AMapsSignHoldsUntilEventsTellOtherwise) {
+  for (const int sign : {-1, 1}) {
+    ContrastMemory memory(2, kThreshold);
+    memory.seed(0, sign);
+    EXPECT_TRUE(memory.known(0));
+    EXPECT_FALSE(memory.measured(0));
+    EXPECT_FALSE(memory.known(1));
+    EXPECT_GE(sign * memory.steps(0), ContrastMemory::kSureSteps);
+    EXPECT_EQ(memory.map_contrast(0), -sign);
+    EXPECT_DOUBLE_EQ(memory.edge_delay(0).on_px + memory.edge_delay(0).off_px,
+                     memory.edge_delay(1).on_px + memory.edge_delay(1).off_px);
+    show(memory, -sign, 200);
+    EXPECT_EQ(memory.map_contrast(0), sign);
+  }
+}
+
 TEST(ContrastMemory, TextureOfBothSignsCancels) {
   ContrastMemory memory(1, kThreshold);
   for (int i = 0; i < 500; ++i) {

@@ -17,7 +17,6 @@ constexpr double kHalfLength_px = 4;
 // them, but where the calibration is wrong they hold a wrong pose together (a focal length off by 5 % is then
 // called tracking).
 constexpr double kAmbiguity_px = 1;
-constexpr double kSureContrast = 0.3;  // thresholds of contrast from which on a polarity is predicted
 constexpr double kFullDelay_px_s =
     20;  // below this flow the edge delay fades out: noise, not the edge, triggers
 constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a contour and still be found
@@ -78,8 +77,8 @@ bool EventRegistration::consistent() const {
 }
 
 bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) const {
-  const double steps = contrast_.steps(s.segment);
-  return sign * steps < 0 && std::abs(steps) >= kSureContrast && contrast_.known(s.segment) &&
+  const double steps = s.normal_side * contrast_.steps(s.segment);
+  return sign * steps < 0 && std::abs(steps) >= ContrastMemory::kSureSteps && contrast_.known(s.segment) &&
          std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
@@ -202,7 +201,7 @@ void EventRegistration::learn_contrast(const RegistrationProblem& p) {
     // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
     if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
       contrast_.sweep(s.segment, 2 * kHalfLength_px * std::abs(s.speed_px_s) * swept_s);
-    if (sums_[i].net != 0) contrast_.count(s.segment, sums_[i].net);
+    if (sums_[i].net != 0) contrast_.count(s.segment, s.normal_side * sums_[i].net);
   }
 }
 

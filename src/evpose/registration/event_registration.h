@@ -54,6 +54,8 @@ class EventRegistration final : public Registration {
   void restart() override { concentration_ = {}; }
   bool reads_surface() const override { return config_.ego_motion_test; }
   std::span<const SampleOffset> offsets() const override { return offsets_; }
+  /// Hands on what the map says of the contrast of a segment, -1, 0 or +1 as ContourPoint::contrast.
+  void seed_contrast(std::uint32_t segment, int map_contrast) { contrast_.seed(segment, -map_contrast); }
   const ContrastMemory* contrast() const override { return &contrast_; }
 
  private:

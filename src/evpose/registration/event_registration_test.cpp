@@ -28,7 +28,11 @@ class EventRegistrationLaws : public ::testing::Test {
   void add_line(const Eigen::Vector2d& at, const Eigen::Vector2d& normal, double speed, int count = 20) {
     const Eigen::Vector2d n = normal.normalized(), t(-n.y(), n.x());
     for (int k = 0; k < count; ++k) {
-      ContourSample s{at + 4.0 * k * t, n, speed, 0, Vector6d::Zero()};
+      ContourSample s;
+      s.pixel = at + 4.0 * k * t;
+      s.normal_px = n;
+      s.speed_px_s = speed;
+      s.jacobian.setZero();
       s.jacobian.head<2>() = -kFocal * n;  // dd/dp: the contour moves along +n, the distance shrinks
       samples_.push_back(s);
     }
@@ -153,6 +157,22 @@ TEST_F(EventRegistrationLaws, WrongPolaritiesAreLeftOutOnceContrastIsKnown) {
   // In the buffer zone both polarities count.
   for (auto& s : samples_) s.speed_sigma_px_s = 1000;
   EXPECT_EQ(registration.measure({events_, kNow, kSpan_s, samples_, covariance_}).wrong_polarity, 0);
+}
+
+TEST_F(EventRegistrationLaws, TheMapsContrastPredictsPolaritiesFromTheFirstEventOn) {
+  add_line({150, 20}, {1, 0}, 500, 50);
+  for (auto& s : samples_) s.speed_sigma_px_s = 10;
+  draw_events(0);
+  for (const int contrast : {-1, 0, 1})
+    for (const int side : {-1, 1}) {
+      for (auto& s : samples_) s.normal_side = side;
+      for (auto& e : events_) e.on = 1;  // getting brighter as it comes: dark in front
+      EventRegistration registration({320, 240}, config_);
+      registration.seed_contrast(0, contrast);
+      const RegistrationResult r = registration.measure({events_, kNow, kSpan_s, samples_, covariance_});
+      EXPECT_EQ(r.wrong_polarity > 100, side * contrast > 0) << contrast << ' ' << side;
+      EXPECT_EQ(r.events > 100, side * contrast <= 0) << contrast << ' ' << side;
+    }
 }
 
 TEST_F(EventRegistrationLaws, EventsBetweenTwoContoursAreLeftOut) {

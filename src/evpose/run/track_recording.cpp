@@ -10,11 +10,13 @@
 
 #include "evpose/io/files/config_yaml.h"
 #include "evpose/io/maps/contour_files.h"
+#include "evpose/io/maps/map_h5.h"
 #include "evpose/io/maps/ply.h"
 #include "evpose/io/motion/imu_units.h"
 #include "evpose/io/recording/recording.h"
 #include "evpose/report/overlay.h"
 #include "evpose/run/packet_queue.h"
+#include "evpose/run/presets.h"
 #include "evpose/run/progress.h"
 #include "evpose/run/start.h"
 
@@ -91,6 +93,38 @@ Status feed(const Recording& recording, const RunConfig& config, Tracker& tracke
   }
 }
 
+/// Draws the map over the time surface at even intervals of the run, for the report.
+class OverlayWriter {
+ public:
+  OverlayWriter(Tracker& tracker, RunFolder& run, TimeNs start, TimeNs end, int count)
+      : tracker_(tracker), run_(run), start_(start), step_(count > 0 ? (end - start) / (count + 1) : 0) {}
+
+  void add(const Update& u) {
+    if (step_ <= 0) return;
+    if (next_ == 0) next_ = start_ + step_;
+    tracker_.keep_time_surface(u.t + kOverlayLead >= next_);
+    if (u.t < next_) return;
+    next_ += step_;
+    const Snapshot s = tracker_.snapshot(kOverlayDecay_s);
+    std::vector<OverlayPoint> points;
+    for (const auto& p : s.points) points.push_back({p.x, p.y, p.matched});
+    run_.add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start_)), " s"),
+                     draw_overlay(s.size.width, s.size.height, s.decay, points));
+  }
+
+ private:
+  Tracker& tracker_;
+  RunFolder& run_;
+  TimeNs start_, step_, next_ = 0;
+};
+
+/// The map of the run with the contrast that it has told, where the map lies in the world as before.
+Status write_learnt_map(const std::string& path, const ContourMap& map, const Tracker& tracker) {
+  const auto placement = read_map_placement(map.source);
+  if (!placement) return placement.error();
+  return write_map_h5(path, tracker.map_with_learnt_contrast(), "", *placement);
+}
+
 }  // namespace
 
 double wall_s() {
@@ -123,6 +157,7 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
   RunConfig config;
   ConfigTable table;
   describe(table, config);
+  if (auto ok = apply_preset(table, request.preset); !ok) return ok.error();
   if (auto ok = apply_settings(table, request.config_file, request.assignments); !ok) return ok.error();
   return config;
 }
@@ -192,32 +227,19 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   auto job = prepare(request, *asked);
   if (!job) return job.error();
   RunConfig& config = job->config;
-  const StartState& start = job->start;
   auto run = RunFolder::create(request.output);
   if (!run) return run.error();
-
-  auto tracker = Tracker::create(job->setup, config.tracker, start, wall_s);
+  auto tracker = Tracker::create(job->setup, config.tracker, job->start, wall_s);
   if (!tracker) return tracker.error();
   int most_points = 0;
   std::int64_t updates = 0;
-  TimeNs next_overlay = start.t;
-  const TimeNs overlay_step = (job->recording.last_ns - start.t) / (config.overlays + 1);
+  OverlayWriter overlays(**tracker, *run, job->start.t, job->recording.last_ns, config.overlays);
   (*tracker)->on_update([&](const Update& u) {
     run->add(u);
     ++updates;
     most_points = std::max(most_points, u.points);
-    if (updates == 1) next_overlay = start.t + overlay_step;
-    if (config.overlays == 0) return;
-    (*tracker)->keep_time_surface(u.t + kOverlayLead >= next_overlay);
-    if (u.t < next_overlay) return;
-    next_overlay += overlay_step;
-    const Snapshot s = (*tracker)->snapshot(kOverlayDecay_s);
-    std::vector<OverlayPoint> points;
-    for (const auto& p : s.points) points.push_back({p.x, p.y, p.matched});
-    run->add_overlay(text("t = ", 1e-3 * std::round(1e3 * to_seconds(u.t - start.t)), " s"),
-                     draw_overlay(s.size.width, s.size.height, s.decay, points));
+    overlays.add(u);
   });
-
   if (config.states_imu) (*tracker)->on_state([&](const FusionState& s) { run->add_state(s); });
 
   const double wall_start = wall_s(), cpu_start = cpu_s();
@@ -231,6 +253,8 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
     return Error{job->map->source,
                  text("none of the map's ", job->map->points.size(), " points ever comes into view"),
                  "check the map's frame, the start pose and the extrinsics T_cam_imu"};
+  if (!request.learnt_map.empty())
+    if (auto ok = write_learnt_map(request.learnt_map, *job->map, **tracker); !ok) return ok.error();
 
   RunSummary summary = summarise(*job, request, **tracker);
   summary.wall_s = wall_s() - wall_start;

@@ -30,7 +30,9 @@ struct TrackRequest {
   std::string init = "auto";             ///< see start.h
   std::vector<double> init_sigma{0, 0};  ///< of a pose given there: m, deg
   std::string output;                    ///< run folder
+  std::string preset;                    ///< a name of presets(); empty: the defaults
   std::string config_file;               ///< optional YAML
+  std::string learnt_map;                ///< map.h5 to write, with the contrast learnt; empty: none
   std::vector<std::string> assignments;  ///< "key=value"
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "evpose/registration/contrast_memory.h"
 #include "evpose/tracker/pose_uncertainty.h"
 
 namespace evpose {
@@ -34,11 +35,22 @@ VisibleSetConfig visible_config(const TrackerConfig& config) {
   return out;
 }
 
+/// The sign that most points of a segment state.
+std::vector<int> contrast_of_segments(const ContourMap& map, const ContourSegments& segments) {
+  std::vector<int> sum(segments.count, 0);
+  for (std::size_t i = 0; i < map.points.size(); ++i) sum[segments.of_point[i]] += map.points[i].contrast;
+  for (int& sign : sum) sign = (sign > 0) - (sign < 0);
+  return sum;
+}
+
 std::unique_ptr<Registration> make_registration(const TrackerConfig& config, ImageSize size,
-                                                std::uint32_t segments) {
+                                                const ContourMap& map, const ContourSegments& segments) {
   if (config.registration == RegistrationKind::temporal_field)
     return std::make_unique<TemporalFieldRegistration>(config.temporal_field, config.threads);
-  return std::make_unique<EventRegistration>(size, config.event_registration, segments);
+  auto out = std::make_unique<EventRegistration>(size, config.event_registration, segments.count);
+  const std::vector<int> contrast = contrast_of_segments(map, segments);
+  for (std::uint32_t i = 0; i < segments.count; ++i) out->seed_contrast(i, contrast[i]);
+  return out;
 }
 
 Status check_start(const ContourMap& map, const StartState& start, double far_m) {
@@ -82,7 +94,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       input_(front_, clock),
       imu_(config.imu, setup.motion),
-      registration_(make_registration(config, setup_.camera->size(), segments_.count)),
+      registration_(make_registration(config, setup_.camera->size(), *setup_.map, segments_)),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
       supervisor_(config.relocalization, config.health,
                   Relocalizer({index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
@@ -215,6 +227,15 @@ std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) cons
   if (reporter_.most_events_shed(front_.counts())) return "more events than are taken (events.most_mev_s)";
   if (!measurement.consistent) return "events do not gather at the contours";
   return imu_.contradicts(t) ? "IMU contradicts the camera" : "";
+}
+
+ContourMap Tracker::map_with_learnt_contrast() const {
+  ContourMap out = *setup_.map;
+  const ContrastMemory* learnt = registration_->contrast();
+  for (std::size_t i = 0; learnt != nullptr && i < out.points.size(); ++i)
+    if (const int sign = learnt->map_contrast(segments_.of_point[i]); sign != 0)
+      out.points[i].contrast = static_cast<std::int8_t>(sign);
+  return out;
 }
 
 Snapshot Tracker::snapshot(double decay_s) const {

@@ -71,8 +71,8 @@ class Tracker {
   const EventFront& events() const { return front_; }
   /// What the fusion found to be wrong with the given calibration, if it was asked to look.
   Calibration calibration() const { return fusion_->calibration(); }
-  /// What has been learnt of the contours' contrast; null if the registration learns none.
-  const ContrastMemory* contrast() const { return registration_->contrast(); }
+  /// The map with the signs of contrast that events have told so far; the others are the map's.
+  ContourMap map_with_learnt_contrast() const;
 
   /// Events and contours at the last update, for pictures; empty of events unless a time surface is kept.
   Snapshot snapshot(double decay_s) const;

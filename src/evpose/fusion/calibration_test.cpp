@@ -92,37 +92,49 @@ PoseInformation summed(const std::vector<ContourOffset>& contours, const Pose& a
   return sum;
 }
 
-Found fly(const Wrong& wrong, const FusionConfig& config, int seconds, unsigned seed = 17) {
-  const ImuNoise noise;
-  const Pose T_body_cam{so3::exp({0.1, -1.2, 0.4}), {0.1, 0.02, -0.05}};
-  const Pose true_T_body_cam{so3::exp(wrong.turn) * T_body_cam.q, T_body_cam.p + wrong.shift};
-  const Eigen::Vector3d gravity = so3::exp({wrong.tilt.x(), wrong.tilt.y(), 0}) * kGravity;
+/// The true states, sample by sample, and what an IMU reads whose clock is ahead by the offset.
+struct Flight {
+  std::vector<NavState> truth;
+  std::vector<ImuSample> readings;
 
-  // Truth and readings, sample by sample; the IMU's clock is ahead by the offset.
-  std::mt19937 random(seed);
+  ImuSample reading_at(TimeNs clock) const {
+    const auto k = static_cast<std::size_t>((clock - readings[0].t) / kStep);
+    return interpolate(readings[k], readings[k + 1], clock);
+  }
+};
+
+Flight make_flight(const Wrong& wrong, int seconds, std::mt19937& random) {
+  const ImuNoise noise;
+  const Eigen::Vector3d gravity = so3::exp({wrong.tilt.x(), wrong.tilt.y(), 0}) * kGravity;
   const int samples = seconds * static_cast<int>(1000 * kNsPerMs / kStep) + 50;
-  std::vector<NavState> truth{{{so3::exp({0.1, -0.2, 0.8}), {1, 2, 1}}, {0, 0, 0}}};
-  if (wrong.hover) truth[0].T_map_body.q = Eigen::Quaterniond::Identity();
-  std::vector<ImuSample> clean, readings;
+  Flight out;
+  out.truth = {{{so3::exp({0.1, -0.2, 0.8}), {1, 2, 1}}, {0, 0, 0}}};
+  if (wrong.hover) out.truth[0].T_map_body.q = Eigen::Quaterniond::Identity();
+  std::vector<ImuSample> clean;
   const Eigen::Vector3d gyro_bias = draw(random, 0.01), accel_bias = draw(random, 0.05);
   const double rate = std::sqrt(1 / to_seconds(kStep));
   for (int k = 0; k < samples; ++k) {
     clean.push_back(wrong.hover ? still(k * kStep) : moving(k * kStep));
     if (k > 0)
-      truth.push_back(
-          strapdown(truth.back(), clean[clean.size() - 2], clean.back(), {0, 0, 0}, {0, 0, 0}, gravity));
+      out.truth.push_back(
+          strapdown(out.truth.back(), clean[clean.size() - 2], clean.back(), {0, 0, 0}, {0, 0, 0}, gravity));
     ImuSample s = clean.back();
     s.t += from_seconds(wrong.offset_s);
     s.gyro += gyro_bias + draw(random, noise.gyro_density * rate);
     s.accel += accel_bias + draw(random, noise.accel_density * rate);
-    readings.push_back(s);
+    out.readings.push_back(s);
   }
-  const auto reading_at = [&](TimeNs clock) {
-    const auto k = static_cast<std::size_t>((clock - readings[0].t) / kStep);
-    return interpolate(readings[k], readings[k + 1], clock);
-  };
+  return out;
+}
 
-  Ekf ekf(StatePropagator(MotionModel::imu, config, noise), config, T_body_cam);
+Found fly(const Wrong& wrong, const FusionConfig& config, int seconds, unsigned seed = 17) {
+  const Pose T_body_cam{so3::exp({0.1, -1.2, 0.4}), {0.1, 0.02, -0.05}};
+  const Pose true_T_body_cam{so3::exp(wrong.turn) * T_body_cam.q, T_body_cam.p + wrong.shift};
+  std::mt19937 random(seed);
+  const Flight flight = make_flight(wrong, seconds, random);
+  const std::vector<NavState>& truth = flight.truth;
+
+  Ekf ekf(StatePropagator(MotionModel::imu, config, ImuNoise{}), config, T_body_cam);
   const std::size_t first = 20;
   NavState start = truth[first];
   start.T_map_body = start.T_map_body.plus(wrong.start);
@@ -141,8 +153,8 @@ Found fly(const Wrong& wrong, const FusionConfig& config, int seconds, unsigned 
     if (until < ekf.state().t) continue;  // the offset has fallen: that time is past
     while (ekf.state().t < until) {
       const TimeNs from = ekf.state().t;
-      const TimeNs grid = readings[0].t + ((from - readings[0].t) / kStep + 1) * kStep;
-      ekf.predict(reading_at(from), reading_at(std::min(grid, until)), ImuTrust::good);
+      const TimeNs zero = flight.readings[0].t, grid = zero + ((from - zero) / kStep + 1) * kStep;
+      ekf.predict(flight.reading_at(from), flight.reading_at(std::min(grid, until)), ImuTrust::good);
     }
     ++updates;
     out.frozen += ekf.calibration().frozen ? 1 : 0;

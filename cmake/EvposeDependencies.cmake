@@ -10,12 +10,13 @@ find_package(CLI11 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(BZip2 REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(embree 3.12 REQUIRED)
 find_package(assimp REQUIRED)
 find_package(Boost 1.74 REQUIRED)  # headers alone
-foreach(library lz4 zstd blosc)  # no CMake packages in Debian 12
-  find_path(EVPOSE_${library}_INCLUDE ${library}.h REQUIRED)
+foreach(library lz4 lzf zstd blosc)  # no CMake packages in Debian 12
+  find_path(EVPOSE_${library}_INCLUDE ${library}.h PATH_SUFFIXES lib${library} REQUIRED)
   find_library(EVPOSE_${library}_LIBRARY ${library} REQUIRED)
   add_library(evpose_${library} INTERFACE)
   target_include_directories(evpose_${library} SYSTEM INTERFACE ${EVPOSE_${library}_INCLUDE})

@@ -18,7 +18,8 @@ build=(
   libcli11-dev         # command line
   nlohmann-json3-dev   # summary.json
   libpng-dev           # pictures in the report and in recordings
-  libbz2-dev liblz4-dev libzstd-dev libblosc-dev  # compressed bags, recordings and data sets
+  libbz2-dev liblz4-dev libzstd-dev libblosc-dev liblzf-dev  # compressed bags, recordings, clouds and data sets
+  zlib1g-dev           # checksums of bags and maps
   libsqlite3-dev       # ROS 2 bags
   libnanoflann-dev     # nearest points, to build maps from clouds
   libembree-dev        # ray casting in the simulator

@@ -57,8 +57,8 @@ OUTSIDE = [
     ("yaml-cpp", r"yaml-cpp/", FORMATS),
     ("HDF5", r"hdf5|H5", {"io", "bench"}),  # the bench times it against ours
     ("JSON", r"nlohmann/", FORMATS),
-    ("libpng", r"png\.h", FORMATS),
-    ("compressors", r"(bzlib|lz4|lz4frame|zstd|blosc|zlib)\.h", {"io"}),
+    ("libpng", r"png\.h", {"io"}),
+    ("compressors", r"(bzlib|lz4|lz4frame|lzf|zstd|blosc|zlib)\.h", {"io"}),
     ("SQLite", r"sqlite3\.h", {"io"}),
     ("nanoflann", r"nanoflann", {"map_build"}),
     ("Embree", r"embree3/", {"sim"}),

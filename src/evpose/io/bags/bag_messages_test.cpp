@@ -7,8 +7,6 @@
 
 #include "evpose/io/bags/event_messages.h"
 #include "evpose/io/bags/message_writer.h"
-#include "evpose/io/files/compression.h"
-#include "evpose/io/files/crc32.h"
 #include "evpose/io/files/test_files.h"
 
 namespace evpose {
@@ -231,42 +229,6 @@ TEST(Definition, AChangedOneIsRefusedWithBothSums) {
                    {"a.bag", "00000000000000000000000000000000", "6a62c6daae103f4ff57a132d6f95cec2"}));
   changed.md5 = "*";
   EXPECT_TRUE(check_definition(changed, "a.bag").ok());
-}
-
-TEST(Compression, BlocksComeBackAndDamageIsTold) {
-  std::string content;
-  for (int i = 0; i < 100'000; ++i) content += static_cast<char>('a' + i * i % 23);
-  const auto plain = std::as_bytes(std::span(content));
-  std::vector<std::byte> room;
-  for (const auto method : {Compression::none, Compression::lz4, Compression::zstd}) {
-    const auto packed = compress(method, plain);
-    const auto size = decompress(method, packed, content.size(), "here", room);
-    ASSERT_TRUE(size.ok()) << error_line(size);
-    ASSERT_EQ(*size, content.size());
-    EXPECT_TRUE(std::equal(plain.begin(), plain.end(), room.begin()));
-    EXPECT_TRUE(says(error_line(decompress(method, packed, content.size() - 1, "here", room)), {"here"}));
-    if (method == Compression::none) continue;
-    for (std::size_t n = 0; n < packed.size(); n += packed.size() / 40 + 1)
-      EXPECT_FALSE(decompress(method, std::span(packed).first(n), content.size(), "here", room).ok()) << n;
-  }
-}
-
-TEST(Crc32, IsTheDefinitionBitByBit) {
-  std::string data = "123456789";
-  EXPECT_EQ(crc32(data.data(), data.size()), 0xCBF43926u);
-  for (int i = 0; i < 100; ++i) data += static_cast<char>(i * 37);
-  for (std::size_t begin = 0; begin < 9; ++begin) {
-    for (std::size_t size = 0; size < 40; ++size) {
-      std::uint32_t slow = 0xFFFFFFFF;
-      for (std::size_t i = 0; i < size; ++i) {
-        slow ^= static_cast<unsigned char>(data[begin + i]);
-        for (int bit = 0; bit < 8; ++bit) slow = slow >> 1 ^ ((slow & 1) != 0 ? 0xEDB88320 : 0);
-      }
-      EXPECT_EQ(crc32(data.data() + begin, size), ~slow);
-      EXPECT_EQ(crc32(data.data() + begin + size / 3, size - size / 3, crc32(data.data() + begin, size / 3)),
-                ~slow);
-    }
-  }
 }
 
 }  // namespace

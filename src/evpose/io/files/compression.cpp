@@ -3,9 +3,11 @@
 
 #include <bzlib.h>
 #include <lz4frame.h>
+#include <lzf.h>
 #include <zstd.h>
 
 #include <algorithm>
+#include <climits>
 #include <cstdint>
 #include <memory>
 
@@ -142,6 +144,14 @@ Expected<std::size_t> decompress(Compression method, std::span<const std::byte> 
   if (room.size() < data.size()) room.resize(data.size());
   std::copy(data.begin(), data.end(), room.begin());
   return data.size();
+}
+
+bool decompress_lzf(std::span<const std::byte> block, std::span<std::byte> out) {
+  if (block.empty()) return out.empty();  // the library reads a byte before it looks how many there are
+  if (block.size() > UINT_MAX || out.size() > UINT_MAX) return false;
+  const unsigned written = lzf_decompress(block.data(), static_cast<unsigned>(block.size()), out.data(),
+                                          static_cast<unsigned>(out.size()));
+  return written != 0 && written == out.size();
 }
 
 std::vector<std::byte> compress(Compression method, std::span<const std::byte> data) {

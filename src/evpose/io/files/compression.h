@@ -19,6 +19,9 @@ enum class Compression { none, lz4, zstd, bz2 };
 Expected<std::size_t> decompress(Compression method, std::span<const std::byte> data, std::size_t largest,
                                  const std::string& where, std::vector<std::byte>& room);
 
+/// Undoes the compression of one LZF block. True when it is sound and fills `out` exactly.
+bool decompress_lzf(std::span<const std::byte> block, std::span<std::byte> out);
+
 /// One frame. For none, lz4 and zstd.
 std::vector<std::byte> compress(Compression method, std::span<const std::byte> data);
 

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "evpose/io/files/compression.h"
-#include "evpose/io/files/lzf.h"
 #include "evpose/io/hdf5/ecf.h"
 
 namespace evpose {
@@ -87,7 +86,7 @@ bool undo_lz4(Bytes in, std::span<const unsigned>, Room& out) {
 bool undo_lzf(Bytes in, std::span<const unsigned> parameters, Room& out) {
   if (parameters.size() < 3 || parameters[2] > largest()) return false;
   out.resize(parameters[2]);
-  return lzf_decompress(in, out);
+  return decompress_lzf(in, out);
 }
 
 bool undo_ecf(Bytes in, std::span<const unsigned>, Room& out) {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "evpose/io/files/child_process.h"
-#include "evpose/io/files/lzf.h"
 #include "evpose/io/files/test_files.h"
 #include "evpose/io/maps/las.h"
 #include "evpose/io/maps/pcd.h"
@@ -169,41 +168,6 @@ TEST(Ply, RealCloudsHaveTheKnownCounts) {
   ASSERT_TRUE(mesh.ok()) << error_line(mesh);
   EXPECT_EQ(mesh->vertices.size(), 18306u);
   EXPECT_EQ(mesh->triangles.size(), 9280u);
-}
-
-std::vector<std::byte> as_bytes(const std::string& s) {
-  std::vector<std::byte> out(s.size());
-  std::memcpy(out.data(), s.data(), s.size());
-  return out;
-}
-
-std::string unpacked(const std::string& packed, std::size_t size) {
-  std::vector<std::byte> out(size);
-  if (!lzf_decompress(as_bytes(packed), out)) return "(damaged)";
-  return {reinterpret_cast<const char*>(out.data()), out.size()};
-}
-
-TEST(Lzf, RunsAndCopies) {
-  EXPECT_EQ(unpacked("\x02"
-                     "abc",
-                     3),
-            "abc");
-  // A copy that overlaps itself: one byte back, five long.
-  EXPECT_EQ(unpacked(std::string("\0a\x60\0", 4), 6), "aaaaaa");
-  // The long form: 7 in the head, then 20 more.
-  EXPECT_EQ(unpacked(std::string("\0a\xE0\x14\0", 5), 30), std::string(30, 'a'));
-  for (const char* bad : {"\x05"
-                          "abc",
-                          "\x20", "\x20\x05", "\xE0"})
-    EXPECT_EQ(unpacked(bad, 3), "(damaged)");
-  EXPECT_EQ(unpacked("\x02"
-                     "abc",
-                     2),
-            "(damaged)");
-  EXPECT_EQ(unpacked("\x02"
-                     "abc",
-                     4),
-            "(damaged)");
 }
 
 std::string pcd_header(const std::string& data, int points, const std::string& more = "") {

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "evpose/core/log.h"
+#include "evpose/io/files/compression.h"
 #include "evpose/io/files/input_file.h"
-#include "evpose/io/files/lzf.h"
 #include "evpose/io/files/numbers.h"
 
 namespace evpose {
@@ -226,7 +226,7 @@ Status read_compressed(const std::string& path, const std::string& data, const H
     return Error{path, text(packed, " packed bytes cannot stand for ", unpacked),
                  "the file is damaged; copy it again"};
   std::vector<std::byte> bytes(unpacked);
-  if (!lzf_decompress(std::as_bytes(std::span(data.data() + 8, packed)), bytes))
+  if (!decompress_lzf(std::as_bytes(std::span(data.data() + 8, packed)), bytes))
     return Error{path, "the compressed block is damaged", "copy the file again"};
   // Field after field; within a field, point after point with its items together.
   const char* field_begin = reinterpret_cast<const char*>(bytes.data());

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "evpose/report/png.h"
+#include "evpose/io/files/png_file.h"
 
 namespace evpose {
 

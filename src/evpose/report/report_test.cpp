@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-#include <png.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -11,10 +10,10 @@
 #include <numeric>
 #include <set>
 
+#include "evpose/io/files/png_file.h"
 #include "evpose/report/map_accuracy.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/page.h"
-#include "evpose/report/png.h"
 #include "evpose/report/run_folder.h"
 #include "evpose/report/series.h"
 #include "evpose/report/state_log.h"
@@ -105,21 +104,6 @@ Expected<RunOutcome> write_run(const std::string& path, double wall_s = 1e-4) {
   table.add("tracker.on", config.on, "a switch");
   table.add("tracker.name", config.name, "a name");
   return folder->finish(a_summary(), table);
-}
-
-TEST(Png, DecodesToTheSameImage) {
-  RgbImage image(5, 3);
-  std::iota(image.rgb.begin(), image.rgb.end(), std::uint8_t{7});
-  const std::string bytes = encode_png(image);
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
-  png.format = PNG_FORMAT_RGB;
-  ASSERT_EQ(png.width, 5u);
-  ASSERT_EQ(png.height, 3u);
-  std::vector<std::uint8_t> rgb(image.rgb.size());
-  ASSERT_NE(png_image_finish_read(&png, nullptr, rgb.data(), 0, nullptr), 0);
-  EXPECT_EQ(rgb, image.rgb);
 }
 
 TEST(Overlay, OnIsRedOffIsBlueMatchedIsGreenNothingIsWhite) {

@@ -12,7 +12,7 @@
 #include "evpose/core/error.h"
 #include "evpose/core/pose.h"
 #include "evpose/eval/score.h"
-#include "evpose/report/png.h"
+#include "evpose/io/files/png_file.h"
 #include "evpose/tracker/update.h"
 
 namespace evpose {

@@ -9,6 +9,24 @@
 
 namespace evpose {
 
+/// Eight bits a channel, rows from the top, red first.
+struct RgbImage {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;  ///< 3 * width * height
+
+  RgbImage(int image_width, int image_height, std::uint8_t value = 255)
+      : width(image_width),
+        height(image_height),
+        rgb(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value) {}
+  std::uint8_t* pixel(int x, int y) {
+    return &rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                     static_cast<std::size_t>(x))];
+  }
+};
+
+/// The bytes of a PNG file. An empty image is a fault of ours.
+std::string encode_png(const RgbImage& image);
+
 /// Grey pictures, rows from the top. Faults of ours: an empty picture, a size that does not fit.
 Status write_png_grey8(const std::string& path, int width, int height,
                        const std::vector<std::uint8_t>& pixels);

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/io/files/png_file.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+
+#include "evpose/io/files/test_files.h"
+
+namespace evpose {
+namespace {
+
+TEST(Png, ColoursDecodeToTheSameImage) {
+  RgbImage image(5, 3);
+  std::iota(image.rgb.begin(), image.rgb.end(), std::uint8_t{7});
+  const std::string bytes = encode_png(image);
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
+  png.format = PNG_FORMAT_RGB;
+  ASSERT_EQ(png.width, 5u);
+  ASSERT_EQ(png.height, 3u);
+  std::vector<std::uint8_t> rgb(image.rgb.size());
+  ASSERT_NE(png_image_finish_read(&png, nullptr, rgb.data(), 0, nullptr), 0);
+  EXPECT_EQ(rgb, image.rgb);
+}
+
+/// The samples of a grey file, as libpng gives them back.
+template <class T>
+std::vector<T> read_grey(const std::string& path, int width, int height) {
+  const std::string bytes = content_of(path);
+  std::vector<T> out;
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  std::string_view rest = bytes;
+  png_set_read_fn(png, &rest, [](png_structp reader, png_bytep to, png_size_t count) {
+    auto& left = *static_cast<std::string_view*>(png_get_io_ptr(reader));
+    if (count > left.size()) png_error(reader, "the file ends too early");
+    std::memcpy(to, left.data(), count);
+    left.remove_prefix(count);
+  });
+  png_read_info(png, info);
+  EXPECT_EQ(png_get_image_width(png, info), static_cast<png_uint_32>(width));
+  EXPECT_EQ(png_get_image_height(png, info), static_cast<png_uint_32>(height));
+  EXPECT_EQ(png_get_bit_depth(png, info), 8 * sizeof(T));
+  EXPECT_EQ(png_get_color_type(png, info), PNG_COLOR_TYPE_GRAY);
+  if (sizeof(T) == 2) png_set_swap(png);
+  std::vector<T> row(png_get_rowbytes(png, info) / sizeof(T));
+  for (int y = 0; y < height; ++y) {
+    png_read_row(png, reinterpret_cast<png_bytep>(row.data()), nullptr);
+    out.insert(out.end(), row.begin(), row.end());
+  }
+  png_destroy_read_struct(&png, &info, nullptr);
+  return out;
+}
+
+TEST(Png, GreyOfEitherDepthDecodesToTheSameSamples) {
+  const TemporaryFolder folder;
+  std::vector<std::uint8_t> bytes(7 * 4);
+  std::iota(bytes.begin(), bytes.end(), std::uint8_t{200});
+  ASSERT_TRUE(write_png_grey8(folder / "8.png", 7, 4, bytes).ok());
+  EXPECT_EQ(read_grey<std::uint8_t>(folder / "8.png", 7, 4), bytes);
+  std::vector<std::uint16_t> words(bytes.size());
+  std::iota(words.begin(), words.end(), std::uint16_t{0xA0F0});
+  ASSERT_TRUE(write_png_grey16(folder / "16.png", 7, 4, words).ok());
+  EXPECT_EQ(read_grey<std::uint16_t>(folder / "16.png", 7, 4), words);
+}
+
+}  // namespace
+}  // namespace evpose

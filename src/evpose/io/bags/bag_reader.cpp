@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/io/bags/bag_reader.h"
 
-#include <array>
 #include <filesystem>
 
 #include "evpose/io/bags/mcap.h"
@@ -12,6 +11,7 @@
 namespace evpose {
 namespace {
 
+constexpr std::size_t kBagHeadBytes = 16;  // more than the longest of the magics
 constexpr std::string_view kZstdMagic = "\x28\xB5\x2F\xFD";
 
 bool starts_as_sqlite(std::string_view head) {
@@ -46,16 +46,20 @@ bool is_rosbag2_folder(const std::string& path) {
   return false;
 }
 
+bool is_bag(const std::string& path) {
+  if (is_rosbag2_folder(path)) return true;
+  const auto head = first_bytes(path, kBagHeadBytes);
+  return head && (starts_as_rosbag1(*head) || starts_as_mcap(*head) || starts_as_rosbag2(*head));
+}
+
 Expected<std::unique_ptr<BagReader>> open_bag(const std::string& path) {
   if (is_rosbag2_folder(path)) return open_rosbag2_folder(path);
-  const auto file = open_to_read(path);
-  if (!file) return file.error();
-  std::array<char, 16> bytes{};
-  const std::string_view head(bytes.data(), std::fread(bytes.data(), 1, bytes.size(), file->stream.get()));
-  if (starts_as_rosbag1(head)) return open_rosbag1(path);
-  if (starts_as_mcap(head)) return open_mcap(path);
-  if (starts_as_sqlite(head)) return open_rosbag2_sqlite(path, false);
-  if (starts_as_rosbag2(head)) return open_rosbag2_zstd(path);
+  const auto head = first_bytes(path, kBagHeadBytes);
+  if (!head) return head.error();
+  if (starts_as_rosbag1(*head)) return open_rosbag1(path);
+  if (starts_as_mcap(*head)) return open_mcap(path);
+  if (starts_as_sqlite(*head)) return open_rosbag2_sqlite(path, false);
+  if (starts_as_rosbag2(*head)) return open_rosbag2_zstd(path);
   return Error{path, "is neither a ROS 1 bag, a ROS 2 bag nor an MCAP file", "check the path"};
 }
 

@@ -61,6 +61,8 @@ bool starts_as_mcap(std::string_view head);
 bool starts_as_rosbag2(std::string_view head);
 /// A folder with metadata.yaml or with storage files.
 bool is_rosbag2_folder(const std::string& path);
+/// Whether open_bag() would take it for one of them; false as well where there is nothing.
+bool is_bag(const std::string& path);
 
 /// More than any message or chunk of a sound file, bytes.
 inline constexpr std::size_t kLargestChunk = std::size_t{1} << 30;

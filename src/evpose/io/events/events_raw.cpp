@@ -34,17 +34,11 @@ struct Header {
 
 using Keys = std::map<std::string, std::string>;
 
-std::string lower(std::string s) {
-  std::transform(s.begin(), s.end(), s.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return s;
-}
-
 /// "% key value", keys in lower case; the parts "name=value" of `format` are keys of their own.
 void take_key(const std::string& line, Keys& keys) {
   const std::string_view body = trimmed(std::string_view(line).substr(1));
   const auto blank = std::min(body.find(' '), body.size());
-  const std::string key = lower(std::string(body.substr(0, blank)));
+  const std::string key = lower_case(body.substr(0, blank));
   std::string_view value = trimmed(body.substr(blank));
   if (key != "format") {
     keys[key] = value;
@@ -57,7 +51,7 @@ void take_key(const std::string& line, Keys& keys) {
     if (first) {
       keys["format"] = part;
     } else if (equals != std::string_view::npos) {
-      keys[lower(std::string(part.substr(0, equals)))] = part.substr(equals + 1);
+      keys[lower_case(part.substr(0, equals))] = part.substr(equals + 1);
     }
     value.remove_prefix(std::min(end + 1, value.size()));
   }
@@ -73,7 +67,7 @@ bool parse_side(const std::string& s, int& out) {
 ImageSize size_of_sensor(const Keys& keys) {
   const auto value = [&](const char* key) {
     const auto it = keys.find(key);
-    return it == keys.end() ? std::string() : lower(it->second);
+    return it == keys.end() ? std::string() : lower_case(it->second);
   };
   const std::string generation = value("sensor_generation");
   const std::string name = value("sensor_name") + " " + value("plugin_name") + " gen" + generation;
@@ -125,7 +119,7 @@ Expected<Header> read_header(ByteStream& bytes) {
   const auto encoding = encoding_of(bytes.path(), keys);
   if (!encoding) return encoding.error();
   Header header{
-      .encoding = *encoding, .legacy = lower(keys["endianness"]) != "little", .size = size_of(keys)};
+      .encoding = *encoding, .legacy = lower_case(keys["endianness"]) != "little", .size = size_of(keys)};
   if (header.encoding != Encoding::evt21) return header;
   const auto probe = bytes.peek(kProbeBytes);
   const auto head = probe.first(std::min(probe.size(), kProbeBytes));

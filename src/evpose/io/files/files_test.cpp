@@ -9,9 +9,9 @@
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/files/child_process.h"
 #include "evpose/io/files/config_yaml.h"
-#include "evpose/io/files/crc32.h"
 #include "evpose/io/files/input_file.h"
 #include "evpose/io/files/numbers.h"
+#include "evpose/io/files/row_reader.h"
 #include "evpose/io/files/test_files.h"
 #include "evpose/io/files/yaml_document.h"
 
@@ -121,9 +121,33 @@ TEST(Numbers, FieldsByBlanksOrCommas) {
   EXPECT_TRUE(f.empty());
 }
 
-TEST(Crc32, CheckValue) {
-  EXPECT_EQ(crc32("123456789", 9), 0xCBF43926u);
-  EXPECT_EQ(crc32("6789", 4, crc32("12345", 5)), 0xCBF43926u);
+TEST(RowReader, GivesFieldsAndCommentsOfEachRowWithItsLine) {
+  const TemporaryFolder folder;
+  auto rows = RowReader::open(folder.file("a", "# t x\n\n 1 2.5\t3 \n4, 5\n\n#end\n"));
+  ASSERT_TRUE(rows.ok());
+  ASSERT_TRUE(rows->next().value());
+  EXPECT_EQ(rows->fields(), (std::vector<std::string_view>{"1", "2.5", "3"}));
+  EXPECT_EQ(rows->line(), "1 2.5\t3");
+  EXPECT_EQ(rows->comments(), std::vector<std::string>{" t x"});
+  EXPECT_TRUE(says(rows->where(), {"a:3"}));
+  std::vector<double> values(2);
+  EXPECT_TRUE(rows->numbers(1, values, "").ok());
+  EXPECT_EQ(values, (std::vector<double>{2.5, 3}));
+  ASSERT_TRUE(rows->next().value());
+  EXPECT_EQ(rows->fields(), (std::vector<std::string_view>{"4", "5"}));
+  EXPECT_TRUE(rows->comments().empty());
+  EXPECT_FALSE(rows->next().value());
+}
+
+TEST(RowReader, NumbersThatAreNotFiniteAreNamedWithTheirLine) {
+  const TemporaryFolder folder;
+  for (const char* bad : {"nan", "inf", "1x", "-"}) {
+    auto rows = RowReader::open(folder.file("a", text("0 0\n0 ", bad, "\n")));
+    ASSERT_TRUE(rows->next().value());
+    ASSERT_TRUE(rows->next().value());
+    std::vector<double> values(2);
+    EXPECT_TRUE(says(error_line(rows->numbers(0, values, "two numbers")), {"a:2", bad, "two numbers"}));
+  }
 }
 
 struct Settings {

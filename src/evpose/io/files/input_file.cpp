@@ -29,6 +29,14 @@ Expected<InputFile> open_to_read(const std::string& path) {
   return file;
 }
 
+Expected<std::string> first_bytes(const std::string& path, std::size_t most) {
+  const auto file = open_to_read(path);
+  if (!file) return file.error();
+  std::string bytes(most, '\0');
+  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file->stream.get()));
+  return bytes;
+}
+
 Expected<LineReader> LineReader::open(const std::string& path) {
   auto file = open_to_read(path);
   if (!file) return file.error();

@@ -24,6 +24,9 @@ struct InputFile {
 /// Errors: no such file, a folder, not readable.
 Expected<InputFile> open_to_read(const std::string& path);
 
+/// The first bytes of a file, at most so many: what its format is told by. Errors: as of open_to_read().
+Expected<std::string> first_bytes(const std::string& path, std::size_t most);
+
 /// Lines of a text file in bounded memory.
 class LineReader {
  public:

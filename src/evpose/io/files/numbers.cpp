@@ -2,6 +2,8 @@
 #include "evpose/io/files/numbers.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 
 namespace evpose {
@@ -87,6 +89,13 @@ std::string_view trimmed(std::string_view s) {
   return s;
 }
 
+std::string lower_case(std::string_view s) {
+  std::string out(s);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return out;
+}
+
 std::string format_decimal(std::int64_t value, int decimals) {
   // Through unsigned: the most negative number has no positive twin.
   const std::uint64_t magnitude =
@@ -96,6 +105,15 @@ std::string format_decimal(std::int64_t value, int decimals) {
     digits.insert(0, static_cast<std::size_t>(decimals) + 1 - digits.size(), '0');
   if (decimals > 0) digits.insert(digits.size() - static_cast<std::size_t>(decimals), 1, '.');
   return (value < 0 ? "-" : "") + digits;
+}
+
+void append_number(std::string& line, char separator, double value, int decimals) {
+  std::array<char, 352> buffer{};  // the largest double has 309 digits before the point
+  const auto end =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed, decimals)
+          .ptr;
+  line += separator;
+  line.append(buffer.data(), end);
 }
 
 }  // namespace evpose

@@ -15,7 +15,8 @@
 #include "evpose/io/events/events_h5.h"
 #include "evpose/io/events/events_raw.h"
 #include "evpose/io/events/events_text.h"
-#include "evpose/io/files/byte_stream.h"
+#include "evpose/io/files/input_file.h"
+#include "evpose/io/files/numbers.h"
 #include "evpose/io/motion/dataflash.h"
 
 namespace evpose {
@@ -62,9 +63,7 @@ constexpr EventFormat kFormats[] = {
 };
 
 bool has_extension(const std::string& path, std::string_view extensions) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
   if (extension.empty()) return false;
   for (std::size_t at = 0; at < extensions.size();) {
     const auto end = std::min(extensions.find(' ', at), extensions.size());
@@ -93,12 +92,10 @@ Expected<const EventFormat*> find_event_format(const std::string& path, const st
     return Error{path, "the event format '" + name + "' is unknown", "events.format is one of " + known};
   }
   if (is_rosbag2_folder(path)) return &by_name("rosbag2");
-  if (is_rosbag2_folder(path)) return &by_name("rosbag2");
-  auto bytes = ByteStream::open(path);
-  if (!bytes) return bytes.error();
-  const auto head = as_text(bytes->peek(kHeadBytes));
+  const auto head = first_bytes(path, kHeadBytes);
+  if (!head) return head.error();
   for (const EventFormat& format : kFormats)
-    if (format.recognises != nullptr && format.recognises(head)) return &format;
+    if (format.recognises != nullptr && format.recognises(*head)) return &format;
   for (const EventFormat& format : kFormats)
     if (has_extension(path, format.extensions)) return &format;
   return &by_name("text");

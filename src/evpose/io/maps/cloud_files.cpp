@@ -2,11 +2,9 @@
 #include "evpose/io/maps/cloud_files.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "evpose/core/log.h"
-#include "evpose/io/files/input_file.h"
 #include "evpose/io/maps/las.h"
 #include "evpose/io/maps/pcd.h"
 #include "evpose/io/maps/ply.h"
@@ -15,20 +13,15 @@ namespace evpose {
 namespace {
 
 constexpr double kFarthest_m = 1e7;  // from the origin
-constexpr double kSmallest_m = 0.3;  // scenes that someone flies in are larger ...
-constexpr double kLargest_m = 5000;  // ... and smaller
+constexpr double kSmallest_m = 0.3;  // scenes that someone flies in are larger
+constexpr double kLargest_m = 5000;  // scenes that someone flies in are smaller
 
 Expected<PointTable> read_table(const std::string& path) {
-  const auto file = open_to_read(path);
-  if (!file) return file.error();
-  if (file->size == 0) return Error{path, "the file is empty", "copy it again"};
-  std::array<char, 8> head{};
-  const std::size_t size = std::fread(head.data(), 1, head.size(), file->stream.get());
-  const std::string_view start(head.data(), size);
-  if (start.starts_with("ply") || path.ends_with(".ply")) return read_ply_vertices(path);
-  if (start.starts_with("LASF")) return read_las(path);
-  if (start.starts_with("# .PCD") || start.starts_with("VERSION") || path.ends_with(".pcd"))
-    return read_pcd(path);
+  const auto kind = point_file_kind(path);
+  if (!kind) return kind.error();
+  if (*kind == PointFileKind::ply) return read_ply_vertices(path);
+  if (*kind == PointFileKind::las) return read_las(path);
+  if (*kind == PointFileKind::pcd) return read_pcd(path);
   return Error{path, "is neither PLY, PCD nor LAS", "convert the cloud to one of them"};
 }
 

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "evpose/core/log.h"
-#include "evpose/io/files/input_file.h"
 #include "evpose/io/maps/contour_completion.h"
 #include "evpose/io/maps/map_h5.h"
 #include "evpose/io/maps/pcd.h"
@@ -201,36 +200,20 @@ Expected<ContourMap> from_table(const PointTable& table, const std::string& path
   return map;
 }
 
-enum class FileKind { ply, pcd, hdf5, other };
-
-Expected<FileKind> kind_of(const std::string& path) {
-  const auto file = open_to_read(path);
-  if (!file) return file.error();
-  if (file->size == 0) return Error{path, "the file is empty", "copy it again"};
-  std::array<char, 8> head{};
-  const std::size_t size = std::fread(head.data(), 1, head.size(), file->stream.get());
-  const std::string_view start(head.data(), size);
-  if (start.starts_with("ply") || path.ends_with(".ply")) return FileKind::ply;
-  if (start.starts_with("\x89HDF") || path.ends_with(".h5")) return FileKind::hdf5;
-  if (start.starts_with("# .PCD") || start.starts_with("VERSION") || path.ends_with(".pcd"))
-    return FileKind::pcd;
-  return FileKind::other;
-}
-
 }  // namespace
 
 Expected<ContourMap> read_contour_map(const std::string& path, const ContourReadOptions& options) {
-  const auto kind = kind_of(path);
+  const auto kind = point_file_kind(path);
   if (!kind) return kind.error();
-  if (*kind == FileKind::hdf5) {
+  if (*kind == PointFileKind::hdf5) {
     auto map = read_map_h5(path);
     if (!map) return map.error();
     if (auto status = complete_contours(*map); !status) return status.error();
     return map;
   }
-  if (*kind == FileKind::other)
+  if (*kind != PointFileKind::ply && *kind != PointFileKind::pcd)
     return Error{path, "is neither PLY, PCD nor HDF5", "convert the map to one of them"};
-  const auto table = *kind == FileKind::ply ? read_ply_vertices(path) : read_pcd(path);
+  const auto table = *kind == PointFileKind::ply ? read_ply_vertices(path) : read_pcd(path);
   if (!table) return table.error();
   return from_table(*table, path, options);
 }

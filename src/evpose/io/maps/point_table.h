@@ -7,7 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "evpose/core/error.h"
+
 namespace evpose {
+
+/// Kinds of files that may hold points or contours.
+enum class PointFileKind { ply, pcd, las, hdf5, other };
+
+/// By the first bytes, then the extension. Errors: no such file, an empty one.
+Expected<PointFileKind> point_file_kind(const std::string& path);
 
 /// Columns of numbers by name, as point files hold them.
 struct PointTable {

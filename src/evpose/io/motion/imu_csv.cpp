@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
 #include "evpose/core/log.h"
 #include "evpose/io/files/atomic_file.h"
-#include "evpose/io/files/input_file.h"
 #include "evpose/io/files/numbers.h"
+#include "evpose/io/files/row_reader.h"
 
 namespace evpose {
 namespace {
@@ -36,60 +35,48 @@ Expected<std::array<std::size_t, 7>> places_of(const std::vector<std::string>& c
   return places;
 }
 
-std::string format_number(double value) {
-  std::array<char, 32> buffer{};
-  const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed, 9).ptr;
-  return {buffer.data(), end};
+Status read_header(LineReader& lines) {
+  std::string_view line;
+  const auto more = lines.next(line);
+  if (!more) return more.error();
+  if (!*more) return Error{lines.where(), "the file is empty", "store the IMU's samples, or remove it"};
+  if (line != kHeader && !line.starts_with(kEurocHeader))
+    return Error{lines.where(), "the first line is not '" + kHeader + "'",
+                 "write that line, or name the columns by imu.columns in recording.yaml"};
+  return {};
 }
 
 }  // namespace
 
 struct ImuReader::Impl {
-  Impl(std::optional<LineReader> reader, ImuReadOptions how)
-      : lines_of_file(std::move(reader)), options(std::move(how)) {}
+  Impl(std::optional<RowReader> reader, ImuReadOptions how)
+      : rows(std::move(reader)), options(std::move(how)) {}
 
-  std::optional<LineReader> lines_of_file;  ///< unset: samples
+  std::optional<RowReader> rows;  ///< unset: samples
   std::string path;
   std::shared_ptr<const std::vector<ImuSample>> samples;
   std::size_t next_sample = 0;
   ImuReadOptions options;
   std::array<std::size_t, 7> places{};
   std::size_t columns = 7;
-  std::vector<std::string_view> fields;
   bool first = true;
   TimeNs last = 0;
   int gaps = 0;
   double longest_gap_s = 0;
   std::int64_t longest_gap_line = 0;
 
-  LineReader& lines() { return *lines_of_file; }
-  std::int64_t number() const {
-    return lines_of_file ? lines_of_file->number() : static_cast<std::int64_t>(next_sample) - 1;
-  }
+  std::int64_t number() const { return rows ? rows->number() : static_cast<std::int64_t>(next_sample) - 1; }
   std::string where() const {
-    return lines_of_file ? lines_of_file->where() : text(path, ": IMU sample ", number(), " (from 0)");
+    return rows ? rows->where() : text(path, ": IMU sample ", number(), " (from 0)");
   }
   Expected<bool> read_one(ImuSample& sample);
-  Status read_header();
   Expected<bool> read_row(ImuSample& sample);
-  Status parse(std::string_view line, ImuSample& sample);
+  Status parse(ImuSample& sample) const;
   Status check_time(TimeNs t);
 };
 
-Status ImuReader::Impl::read_header() {
-  std::string_view line;
-  const auto more = lines().next(line);
-  if (!more) return more.error();
-  if (!*more) return Error{where(), "the file is empty", "store the IMU's samples, or remove it"};
-  if (options.columns.empty() && line != kHeader && !line.starts_with(kEurocHeader))
-    return Error{where(), "the first line is not '" + kHeader + "'",
-                 "write that line, or name the columns by imu.columns in recording.yaml"};
-  return {};
-}
-
-Status ImuReader::Impl::parse(std::string_view line, ImuSample& sample) {
-  split_fields(line, fields);
+Status ImuReader::Impl::parse(ImuSample& sample) const {
+  const auto& fields = rows->fields();
   if (fields.size() != columns)
     return Error{where(), text(fields.size(), " values instead of ", columns),
                  "is the line cut off, or does imu.columns fit?"};
@@ -133,20 +120,15 @@ Status ImuReader::Impl::check_time(TimeNs t) {
 }
 
 Expected<bool> ImuReader::Impl::read_one(ImuSample& sample) {
-  if (!lines_of_file) {
+  if (!rows) {
     if (next_sample == samples->size()) return false;
     sample = (*samples)[next_sample++];
     return true;
   }
-  std::string_view line;
-  while (true) {
-    const auto more = lines().next(line);
-    if (!more) return more.error();
-    if (!*more) return false;
-    if (trimmed(line).empty() || line.front() == '#') continue;
-    if (auto status = parse(line, sample); !status) return status.error();
-    return true;
-  }
+  const auto more = rows->next();
+  if (!more || !*more) return more;
+  if (auto status = parse(sample); !status) return status.error();
+  return true;
 }
 
 Expected<bool> ImuReader::Impl::read_row(ImuSample& sample) {
@@ -175,13 +157,13 @@ Expected<ImuReader> ImuReader::open(const std::string& path, const ImuReadOption
   const auto& columns = options.columns.empty() ? kColumns : options.columns;
   const auto places = places_of(columns, path);
   if (!places) return places.error();
-  auto impl = std::make_unique<Impl>(Impl(*std::move(lines), options));
-  impl->places = *places;
-  impl->columns = columns.size();
   // With named columns the first line may be data already.
   if (options.columns.empty()) {
-    if (auto status = impl->read_header(); !status) return status.error();
+    if (auto status = read_header(*lines); !status) return status.error();
   }
+  auto impl = std::make_unique<Impl>(RowReader(*std::move(lines)), options);
+  impl->places = *places;
+  impl->columns = columns.size();
   return ImuReader(std::move(impl));
 }
 
@@ -234,7 +216,7 @@ Status write_imu_csv(const std::string& path, const std::vector<ImuSample>& samp
     EVPOSE_CHECK(s.gyro.allFinite() && s.accel.allFinite() && s.gyro.norm() < 1e9 && s.accel.norm() < 1e9);
     std::string line = std::to_string(s.t);
     for (const Eigen::Vector3d& v : {s.gyro, s.accel})
-      for (int k = 0; k < 3; ++k) line += "," + format_number(v[k]);
+      for (int k = 0; k < 3; ++k) append_number(line, ',', v[k], 9);
     file->write(line + "\n");
     before = &s;
   }

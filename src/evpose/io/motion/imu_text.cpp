@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "evpose/core/log.h"
-#include "evpose/io/files/input_file.h"
-#include "evpose/io/files/numbers.h"
+#include "evpose/io/files/row_reader.h"
 
 namespace evpose {
 namespace {
@@ -24,25 +22,18 @@ struct Sample {
 };
 
 Expected<Sample> read_sample(const std::string& path) {
-  auto lines = LineReader::open(path);
-  if (!lines) return lines.error();
+  auto rows = RowReader::open(path);
+  if (!rows) return rows.error();
   Sample out;
-  std::vector<std::string_view> fields;
-  std::string_view line;
   while (out.rows.size() < kSampleRows) {
-    const auto more = lines->next(line);
+    const auto more = rows->next();
     if (!more) return more.error();
     if (!*more) break;
-    line = trimmed(line);
-    if (line.empty() || line.front() == '#') continue;
-    split_fields(line, fields);
-    if (out.rows.empty()) out.columns = fields.size();
-    if (fields.size() < kColumns || fields.size() != out.columns)
-      return Error{lines->where(), text(fields.size(), " values"), kRow};
-    auto& row = out.rows.emplace_back();
-    for (std::size_t k = 0; k < kColumns; ++k)
-      if (!parse_number(fields[k], row[k]) || !std::isfinite(row[k]))
-        return Error{lines->where(), text("'", fields[k], "' is not a finite number"), kRow};
+    const std::size_t columns = rows->fields().size();
+    if (out.rows.empty()) out.columns = columns;
+    if (columns < kColumns || columns != out.columns)
+      return Error{rows->where(), text(columns, " values"), kRow};
+    if (auto status = rows->numbers(0, out.rows.emplace_back(), kRow); !status) return status.error();
   }
   if (out.rows.size() < 2) return Error{path, "holds fewer than two samples", kRow};
   return out;

@@ -11,8 +11,8 @@
 #include "evpose/io/bags/bag_reader.h"
 #include "evpose/io/bags/bag_streams.h"
 #include "evpose/io/files/atomic_file.h"
-#include "evpose/io/files/input_file.h"
 #include "evpose/io/files/numbers.h"
+#include "evpose/io/files/row_reader.h"
 #include "evpose/io/motion/trajectory_rows.h"
 #include "evpose/io/motion/trajectory_tum.h"
 
@@ -54,29 +54,25 @@ int column_of(const std::vector<std::string_view>& heading, char part) {
 }
 
 Expected<Look> look_at(const std::string& path) {
-  auto lines = LineReader::open(path);
-  if (!lines) return lines.error();
+  auto rows = RowReader::open(path);
+  if (!rows) return rows.error();
   Look out;
-  std::vector<std::string_view> fields;
-  std::string_view line;
+  std::vector<std::string_view> heading;
   while (out.stamps.size() < kSampleRows) {
-    const auto more = lines->next(line);
+    const auto more = rows->next();
     if (!more) return more.error();
     if (!*more) break;
-    line = trimmed(line);
-    if (!line.empty() && line.front() == '#') {
-      split_fields(line.substr(1), fields);
-      const int x = column_of(fields, 'x'), w = column_of(fields, 'w');
+    for (const std::string& comment : rows->comments()) {
+      split_fields(comment, heading);
+      const int x = column_of(heading, 'x'), w = column_of(heading, 'w');
       if (x >= 0 && w >= 0) out.scalar_last = x < w;
-      continue;
     }
-    if (line.empty()) continue;
-    split_fields(line, fields);
+    const auto& fields = rows->fields();
     double stamp = 0;
     if (!parse_number(fields.front(), stamp)) break;  // told of when it is read
     if (out.columns == 0) out.columns = fields.size();
     out.fractions = out.fractions || fields.front().find('.') != std::string_view::npos;
-    out.commas = out.commas || line.find(',') != std::string_view::npos;
+    out.commas = out.commas || rows->line().find(',') != std::string_view::npos;
     out.stamps.push_back(stamp);
   }
   return out;
@@ -97,25 +93,14 @@ Expected<std::vector<TimedPose>> read_bag_poses(const std::string& path) {
   return out;
 }
 
-bool is_bag(const std::string& path) {
-  if (is_rosbag2_folder(path)) return true;
-  const auto file = open_to_read(path);
-  if (!file) return false;
-  std::array<char, 16> bytes{};
-  const std::string_view head(bytes.data(), std::fread(bytes.data(), 1, bytes.size(), file->stream.get()));
-  return starts_as_rosbag1(head) || starts_as_mcap(head) || starts_as_rosbag2(head);
-}
-
-Expected<Pose> parse_matrix(const std::vector<std::string_view>& fields, const std::string& where) {
-  if (fields.size() != kMatrixColumns)
-    return Error{where, text(fields.size(), " values instead of ", kMatrixColumns), kKittiRow};
+Expected<Pose> parse_matrix(const RowReader& rows) {
+  const std::string where = rows.where();
+  if (rows.fields().size() != kMatrixColumns)
+    return Error{where, text(rows.fields().size(), " values instead of ", kMatrixColumns), kKittiRow};
+  std::array<double, kMatrixColumns> values{};
+  if (auto status = rows.numbers(0, values, kKittiRow); !status) return status.error();
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  for (std::size_t k = 0; k < kMatrixColumns; ++k) {
-    double value = 0;
-    if (!parse_number(fields[k], value) || !std::isfinite(value))
-      return Error{where, text("'", fields[k], "' is not a finite number"), kKittiRow};
-    matrix(static_cast<int>(k / 4), static_cast<int>(k % 4)) = value;
-  }
+  matrix.topRows<3>() = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(values.data());
   const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
   if (!((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-2) || R.determinant() < 0)
     return Error{where, "its first three columns are no rotation", kKittiRow};
@@ -123,20 +108,18 @@ Expected<Pose> parse_matrix(const std::vector<std::string_view>& fields, const s
 }
 
 Expected<std::vector<TimeNs>> read_times(const std::string& path) {
-  auto lines = LineReader::open(path);
-  if (!lines) return lines.error();
+  auto rows = RowReader::open(path);
+  if (!rows) return rows.error();
   std::vector<TimeNs> out;
-  std::string_view line;
   while (true) {
-    const auto more = lines->next(line);
+    const auto more = rows->next();
     if (!more) return more.error();
     if (!*more) return out;
-    line = trimmed(line);
-    if (line.empty() || line.front() == '#') continue;
     TimeNs t = 0;
-    if (!parse_decimal(line, 9, t) || t > kLargestTimeNs || t < -kLargestTimeNs)
-      return Error{lines->where(), text("'", line, "' is not a time in seconds"), "a line is one stamp"};
-    if (!out.empty() && t <= out.back()) return not_after(lines->where(), t, out.back());
+    if (!parse_decimal(rows->line(), 9, t) || t > kLargestTimeNs || t < -kLargestTimeNs)
+      return Error{rows->where(), text("'", rows->line(), "' is not a time in seconds"),
+                   "a line is one stamp"};
+    if (!out.empty() && t <= out.back()) return not_after(rows->where(), t, out.back());
     out.push_back(t);
   }
 }
@@ -161,28 +144,23 @@ Expected<std::vector<TimedPose>> read_euroc(const std::string& path) {
 }
 
 Expected<std::vector<TimedPose>> read_kitti(const std::string& path, const std::string& times) {
-  auto lines = LineReader::open(path);
-  if (!lines) return lines.error();
+  auto rows = RowReader::open(path);
+  if (!rows) return rows.error();
   const auto times_path = times.empty() ? find_times(path) : Expected<std::string>(times);
   if (!times_path) return times_path.error();
   const auto stamps = read_times(*times_path);
   if (!stamps) return stamps.error();
   std::vector<TimedPose> out;
-  std::vector<std::string_view> fields;
-  std::string_view line;
   while (true) {
-    const auto more = lines->next(line);
+    const auto more = rows->next();
     if (!more) return more.error();
     if (!*more) break;
-    line = trimmed(line);
-    if (line.empty() || line.front() == '#') continue;
-    split_fields(line, fields);
-    const auto pose = parse_matrix(fields, lines->where());
+    const auto pose = parse_matrix(*rows);
     if (!pose) return pose.error();
     if (out.size() < stamps->size())
       out.push_back({(*stamps)[out.size()], *pose});
     else
-      return Error{lines->where(), text("a pose more than the ", stamps->size(), " stamps of ", *times_path),
+      return Error{rows->where(), text("a pose more than the ", stamps->size(), " stamps of ", *times_path),
                    "both need the same number of lines"};
   }
   if (out.size() != stamps->size() || out.empty())

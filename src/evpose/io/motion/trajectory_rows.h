@@ -22,9 +22,6 @@ struct PoseRowLayout {
 /// go back, a quaternion whose norm is off 1 by more than 1e-2 (a smaller error is normalised away), no pose.
 Expected<std::vector<TimedPose>> read_pose_rows(const std::string& path, const PoseRowLayout& layout);
 
-/// Appends ` value` or `,value` in decimal notation.
-void append_number(std::string& line, char separator, double value, int decimals);
-
 /// The error of a stamp that does not come after the last one, given in seconds.
 Error not_after(const std::string& where, TimeNs t, TimeNs last);
 

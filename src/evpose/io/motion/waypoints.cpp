@@ -4,33 +4,30 @@
 #include <array>
 #include <cmath>
 
-#include "evpose/io/files/input_file.h"
-#include "evpose/io/files/numbers.h"
+#include "evpose/io/files/row_reader.h"
 
 namespace evpose {
 
 Expected<std::vector<Waypoint>> read_waypoints(const std::string& path) {
   static const std::string kRow = "a row is `x y z yaw_deg [pause_s]`";
   constexpr double kFarthest = 1e6;  // metres, degrees, seconds
-  auto lines = LineReader::open(path);
-  if (!lines) return lines.error();
+  auto rows = RowReader::open(path);
+  if (!rows) return rows.error();
   std::vector<Waypoint> points;
-  std::vector<std::string_view> fields;
-  std::string_view line;
   while (true) {
-    const auto more = lines->next(line);
+    const auto more = rows->next();
     if (!more) return more.error();
     if (!*more) break;
-    line = trimmed(line);
-    if (line.empty() || line.front() == '#') continue;
-    split_fields(line, fields);
+    const auto& fields = rows->fields();
     if (fields.size() != 4 && fields.size() != 5)
-      return Error{lines->where(), text(fields.size(), " values instead of 4 or 5"), kRow};
+      return Error{rows->where(), text(fields.size(), " values instead of 4 or 5"), kRow};
     std::array<double, 5> v{};
+    if (auto status = rows->numbers(0, std::span(v).first(fields.size()), kRow); !status)
+      return status.error();
     for (std::size_t k = 0; k < fields.size(); ++k)
-      if (!parse_number(fields[k], v[k]) || !(std::abs(v[k]) <= kFarthest))
-        return Error{lines->where(), text("'", fields[k], "' is not a number of sensible size"), kRow};
-    if (v[4] < 0) return Error{lines->where(), text("a pause of ", v[4], " s"), "make it 0 or more"};
+      if (std::abs(v[k]) > kFarthest)
+        return Error{rows->where(), text("'", fields[k], "' is not a number of sensible size"), kRow};
+    if (v[4] < 0) return Error{rows->where(), text("a pause of ", v[4], " s"), "make it 0 or more"};
     points.push_back({{v[0], v[1], v[2]}, v[3], v[4]});
   }
   if (points.size() < 2) return Error{path, text(points.size(), " waypoints"), "give two or more; " + kRow};

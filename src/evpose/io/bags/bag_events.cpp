@@ -6,7 +6,7 @@
 #include "evpose/io/bags/bag_messages.h"
 #include "evpose/io/bags/bag_streams.h"
 #include "evpose/io/bags/event_messages.h"
-#include "evpose/io/events/event_packer.h"
+#include "evpose/io/events/packed_event_reader.h"
 
 namespace evpose {
 namespace {
@@ -116,21 +116,6 @@ Expected<Ends> find_ends(Source& source, const std::string& path) {
   return out;
 }
 
-class EventReaderBag : public EventReader {
- public:
-  EventReaderBag(std::unique_ptr<Source> source, EventPacker packer, EventExtent extent)
-      : source_(std::move(source)), packer_(std::move(packer)), extent_(extent) {}
-
-  Expected<bool> next(EventPacket& packet) override { return packer_.next(packet); }
-  ImageSize size() const override { return packer_.size(); }
-  EventExtent extent() const override { return extent_; }
-
- private:
-  std::unique_ptr<Source> source_;
-  EventPacker packer_;
-  EventExtent extent_;
-};
-
 Expected<std::size_t> choose_topic(const BagReader& bag, const std::string& path, const std::string& name) {
   std::vector<std::size_t> found;
   std::string names;
@@ -156,25 +141,21 @@ Expected<std::size_t> choose_topic(const BagReader& bag, const std::string& path
 
 Expected<std::unique_ptr<EventReader>> open_events_bag(const std::string& path,
                                                        const EventReadOptions& options) {
-  if (!options.time_unit.empty() && options.time_unit != "us")
-    return Error{path, "events.time_unit '" + options.time_unit + "': bags know the unit of their stamps",
-                 "leave events.time_unit out"};
+  if (auto status = check_time_unit(path, options, "us"); !status) return status.error();
   auto bag = open_bag(path);
   if (!bag) return bag.error();
   const auto topic = choose_topic(**bag, path, options.topic);
   if (!topic) return topic.error();
   if (auto status = check_definition((*bag)->topics()[*topic], path); !status) return status.error();
-  auto source = std::make_unique<Source>(*std::move(bag), *topic, path);
+  auto source = std::make_shared<Source>(*std::move(bag), *topic, path);
   const auto ends = find_ends(*source, path);
   if (!ends) return ends.error();
   auto packer = EventPacker::make(
       path, options, options.size == ImageSize{} ? ends->size : options.size,
-      EventPacker::FetchBlock([s = source.get()](EventBlock& block) { return s->fetch(block); }));
+      EventPacker::FetchBlock([source](EventBlock& block) { return source->fetch(block); }));
   if (!packer) return packer.error();
-  const EventExtent extent{ends->first_us * kNsPerUs + options.offset_ns,
-                           ends->last_us * kNsPerUs + options.offset_ns, -1};
-  return std::unique_ptr<EventReader>(
-      std::make_unique<EventReaderBag>(std::move(source), *std::move(packer), extent));
+  const auto extent = make_extent(ends->first_us, ends->last_us, -1, options);
+  return make_packed_reader(*std::move(packer), [extent] { return extent; });
 }
 
 }  // namespace evpose

@@ -6,8 +6,8 @@
 
 #include "evpose/io/bags/bag_reader.h"
 #include "evpose/io/bags/bag_streams.h"
+#include "evpose/io/events/test_columns.h"
 #include "evpose/io/files/test_files.h"
-#include "evpose/io/files/test_sha3.h"
 
 namespace evpose {
 namespace {
@@ -18,40 +18,6 @@ std::string sample(const std::string& name) { return shared_folder() + "/data/re
 
 Json answers_of(const std::string& name) {
   return Json::parse(content_of(sample("known_answers.json"))).at(name);
-}
-
-struct Columns {
-  std::vector<std::int64_t> t_us;
-  std::vector<std::uint16_t> x, y;
-  std::vector<std::uint8_t> p;
-};
-
-template <class T>
-std::string digest(const std::vector<T>& column) {
-  return sha3_224(std::as_bytes(std::span(column)));
-}
-
-template <class T>
-std::uint64_t sum(const std::vector<T>& column) {
-  std::uint64_t total = 0;
-  for (const T value : column) total += static_cast<std::uint64_t>(value);
-  return total;
-}
-
-Expected<Columns> read_columns(EventReader& reader) {
-  Columns c;
-  EventPacket packet;
-  while (true) {
-    const auto more = reader.next(packet);
-    if (!more) return more.error();
-    if (!*more) return c;
-    for (const Event& e : packet.events) {
-      c.t_us.push_back(packet.time(e) / kNsPerUs);
-      c.x.push_back(e.x);
-      c.y.push_back(e.y);
-      c.p.push_back(e.on);
-    }
-  }
 }
 
 struct File {

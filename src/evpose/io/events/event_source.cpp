@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/io/events/event_source.h"
 
-#include <optional>
 #include <utility>
 
-#include "evpose/io/events/event_packer.h"
+#include "evpose/io/events/packed_event_reader.h"
 
 namespace evpose {
 namespace {
@@ -12,10 +11,10 @@ namespace {
 /// A source whose first events are already there: a file without any is told when it is opened.
 class Feed {
  public:
-  static Expected<std::unique_ptr<Feed>> make(const std::string& path, const OpenEventSource& open) {
+  static Expected<std::shared_ptr<Feed>> make(const std::string& path, const OpenEventSource& open) {
     auto source = open();
     if (!source) return source.error();
-    auto feed = std::unique_ptr<Feed>(new Feed(*std::move(source)));
+    auto feed = std::shared_ptr<Feed>(new Feed(*std::move(source)));
     while (feed->first_.count == 0) {
       const auto more = feed->source_->fetch(feed->first_);
       if (!more) return more.error();
@@ -57,36 +56,15 @@ EventExtent measure(const OpenEventSource& open, const EventReadOptions& options
     const std::int64_t t_us = block.time_us(block.count - 1);
     if (t_us > last_us && t_us <= kLargestTimeUs) last_us = t_us;
   }
-  return {first_us * kNsPerUs + options.offset_ns, last_us * kNsPerUs + options.offset_ns, count};
+  return make_extent(first_us, last_us, count, options);
 }
-
-class SourceReader : public EventReader {
- public:
-  SourceReader(std::unique_ptr<Feed> feed, EventPacker packer, std::function<EventExtent()> extent)
-      : feed_(std::move(feed)), packer_(std::move(packer)), measure_(std::move(extent)) {}
-
-  Expected<bool> next(EventPacket& packet) override { return packer_.next(packet); }
-  ImageSize size() const override { return packer_.size(); }
-  EventExtent extent() const override {
-    if (!extent_) extent_ = measure_();
-    return *extent_;
-  }
-
- private:
-  std::unique_ptr<Feed> feed_;
-  EventPacker packer_;
-  std::function<EventExtent()> measure_;
-  mutable std::optional<EventExtent> extent_;
-};
 
 }  // namespace
 
 Expected<std::unique_ptr<EventReader>> make_event_reader(const std::string& path,
                                                          const EventReadOptions& options, ImageSize size,
                                                          OpenEventSource open) {
-  if (!options.time_unit.empty() && options.time_unit != "us")
-    return Error{path, "events.time_unit '" + options.time_unit + "': this format's stamps are microseconds",
-                 "leave events.time_unit out"};
+  if (auto status = check_time_unit(path, options, "us"); !status) return status.error();
   auto feed = Feed::make(path, open);
   if (!feed) return feed.error();
   const std::int64_t first_us = (*feed)->first_us();
@@ -94,12 +72,12 @@ Expected<std::unique_ptr<EventReader>> make_event_reader(const std::string& path
     return Error{path, text("the first stamp, ", first_us, " us, is out of range"),
                  "the file is damaged; copy it again"};
   if (options.size != ImageSize{}) size = options.size;
-  auto packer = EventPacker::make(path, options, size,
-                                  [f = feed->get()](EventBlock& block) { return f->fetch(block); });
+  auto packer =
+      EventPacker::make(path, options, size, [f = *feed](EventBlock& block) { return f->fetch(block); });
   if (!packer) return packer.error();
-  auto extent = [open = std::move(open), options, first_us] { return measure(open, options, first_us); };
-  return std::unique_ptr<EventReader>(
-      std::make_unique<SourceReader>(*std::move(feed), *std::move(packer), std::move(extent)));
+  return make_packed_reader(*std::move(packer), [open = std::move(open), options, first_us] {
+    return measure(open, options, first_us);
+  });
 }
 
 }  // namespace evpose

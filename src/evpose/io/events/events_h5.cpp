@@ -9,6 +9,7 @@
 
 #include "evpose/io/events/event_packer.h"
 #include "evpose/io/events/event_rows.h"
+#include "evpose/io/events/packed_event_reader.h"
 #include "evpose/io/hdf5/hdf5_file.h"
 
 namespace evpose {
@@ -223,21 +224,6 @@ struct Source {
   }
 };
 
-class EventReaderH5 : public EventReader {
- public:
-  EventReaderH5(std::unique_ptr<Source> source, EventPacker packer, EventExtent extent)
-      : source_(std::move(source)), packer_(std::move(packer)), extent_(extent) {}
-
-  Expected<bool> next(EventPacket& packet) override { return packer_.next(packet); }
-  ImageSize size() const override { return packer_.size(); }
-  EventExtent extent() const override { return extent_; }
-
- private:
-  std::unique_ptr<Source> source_;
-  EventPacker packer_;
-  EventExtent extent_;
-};
-
 Expected<EventExtent> extent_of(const Source& source, const EventReadOptions& options) {
   const std::uint64_t rows = source.rows->count();
   const auto first = source.stamp(0), last = source.stamp(rows - 1);
@@ -257,8 +243,7 @@ Expected<EventExtent> extent_of(const Source& source, const EventReadOptions& op
         source.file.path(),
         text(rows, " events within ", *last - *first, " us: the stamps look like seconds, not microseconds"),
         "set events.time_unit: s in recording.yaml"};
-  return EventExtent{*first * kNsPerUs + options.offset_ns, *last * kNsPerUs + options.offset_ns,
-                     static_cast<std::int64_t>(rows)};
+  return make_extent(*first, *last, static_cast<std::int64_t>(rows), options);
 }
 
 Expected<std::unique_ptr<EventRows>> open_rows(const Hdf5File& file, const EventReadOptions& options) {
@@ -266,10 +251,7 @@ Expected<std::unique_ptr<EventRows>> open_rows(const Hdf5File& file, const Event
   if (!metavision && mvsec_events(file, options.topic).empty())
     return ColumnRows::open(file, options.time_unit);
   const std::string unit = metavision ? "us" : "s";
-  if (!options.time_unit.empty() && options.time_unit != unit)
-    return Error{file.path(),
-                 "events.time_unit '" + options.time_unit + "': this format's stamps are in " + unit,
-                 "leave events.time_unit out"};
+  if (auto status = check_time_unit(file.path(), options, unit); !status) return status.error();
   return metavision ? open_metavision_rows(file) : open_mvsec_rows(file, options.topic);
 }
 
@@ -283,19 +265,18 @@ Expected<std::unique_ptr<EventReader>> open_events_h5(const std::string& path,
   if (!rows) return rows.error();
   if ((*rows)->count() == 0) return Error{path, "holds no events", "record again"};
   const ImageSize size = options.size != ImageSize{} ? options.size : (*rows)->size();
-  auto source = std::make_unique<Source>(Source{.file = *std::move(file), .rows = *std::move(rows)});
+  auto source = std::make_shared<Source>(Source{.file = *std::move(file), .rows = *std::move(rows)});
   const auto extent = extent_of(*source, options);
   if (!extent) return extent.error();
-  auto packer = EventPacker::make(path, options, size,
-                                  [s = source.get()](RawEvents& block) { return s->fetch(block); });
+  auto packer =
+      EventPacker::make(path, options, size, [source](RawEvents& block) { return source->fetch(block); });
   if (!packer) return packer.error();
   if (options.t_start_ns) {
     const auto row = source->first_at(packer->first_us());
     if (!row) return row.error();
     source->row = *row;
   }
-  return std::unique_ptr<EventReader>(
-      std::make_unique<EventReaderH5>(std::move(source), *std::move(packer), *extent));
+  return make_packed_reader(*std::move(packer), [extent = *extent] { return extent; });
 }
 
 }  // namespace evpose

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "evpose/io/events/evt3_words.h"
+
 namespace evpose {
 namespace {
 
@@ -14,16 +16,6 @@ constexpr std::int64_t kLowMask = 0xFFF;
 constexpr std::int64_t kLargestJump = 1024;
 constexpr int kVectorPixels = 32;
 constexpr std::size_t kFlushBytes = 256 << 10;
-
-enum Kind : unsigned {
-  kAddressY = 0x0,
-  kAddressX = 0x2,
-  kVectorBase = 0x3,
-  kVector12 = 0x4,
-  kVector8 = 0x5,
-  kTimeLow = 0x6,
-  kTimeHigh = 0x8,
-};
 
 }  // namespace
 
@@ -49,12 +41,12 @@ void EventWriterRaw::put(unsigned kind, unsigned value) {
 
 void EventWriterRaw::put_time(std::int64_t t_us) {
   const std::int64_t high = t_us >> kLowBits;
-  if (high_ < 0) high_ = 0, put(kTimeHigh, 0);
+  if (high_ < 0) high_ = 0, put(Evt3Word::kTimeHigh, 0);
   while (high_ < high) {
     high_ += high - high_ > kLargestJump ? kLargestJump : 1;
-    put(kTimeHigh, static_cast<unsigned>(high_ & kLowMask));
+    put(Evt3Word::kTimeHigh, static_cast<unsigned>(high_ & kLowMask));
   }
-  put(kTimeLow, static_cast<unsigned>(t_us & kLowMask));
+  put(Evt3Word::kTimeLow, static_cast<unsigned>(t_us & kLowMask));
 }
 
 std::size_t EventWriterRaw::run_length(const EventPacket& packet, std::size_t i) {
@@ -75,10 +67,10 @@ void EventWriterRaw::put_vector(const EventPacket& packet, std::size_t begin, st
   const Event& first = packet.events[begin];
   std::uint32_t mask = 0;
   for (std::size_t i = begin; i < end; ++i) mask |= 1u << (packet.events[i].x - first.x);
-  put(kVectorBase, static_cast<unsigned>(first.on << 11) | first.x);
-  put(kVector12, mask & 0xFFF);
-  if (mask >> 12 != 0) put(kVector12, mask >> 12 & 0xFFF);
-  if (mask >> 24 != 0) put(kVector8, mask >> 24);
+  put(Evt3Word::kVectorBase, static_cast<unsigned>(first.on << 11) | first.x);
+  put(Evt3Word::kVector12, mask & 0xFFF);
+  if (mask >> 12 != 0) put(Evt3Word::kVector12, mask >> 12 & 0xFFF);
+  if (mask >> 24 != 0) put(Evt3Word::kVector8, mask >> 24);
 }
 
 Status EventWriterRaw::append(const EventPacket& packet) {
@@ -93,7 +85,7 @@ Status EventWriterRaw::append(const EventPacket& packet) {
     EVPOSE_CHECK(t_us >= last_us_ && e.x < size_.width && e.y < size_.height);
     if (t_us != last_us_) put_time(t_us);
     last_us_ = t_us;
-    if (e.y != y_) put(kAddressY, e.y);
+    if (e.y != y_) put(Evt3Word::kAddressY, e.y);
     y_ = e.y;
     const std::size_t run = run_length(packet, i);
     EVPOSE_CHECK(packet.events[i + run - 1].x < size_.width);
@@ -102,7 +94,7 @@ Status EventWriterRaw::append(const EventPacket& packet) {
       put_vector(packet, i, i + run);
       i += run;
     } else {
-      put(kAddressX, static_cast<unsigned>(e.on << 11) | e.x);
+      put(Evt3Word::kAddressX, static_cast<unsigned>(e.on << 11) | e.x);
       ++i;
     }
   }

@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "evpose/core/log.h"
-#include "evpose/io/events/event_packer.h"
+#include "evpose/io/events/packed_event_reader.h"
 #include "evpose/io/files/input_file.h"
 #include "evpose/io/files/numbers.h"
 
@@ -281,21 +281,6 @@ Expected<std::int64_t> last_stamp(const std::string& path, const Layout& layout,
   return first;
 }
 
-class EventReaderText : public EventReader {
- public:
-  EventReaderText(std::unique_ptr<Source> source, EventPacker packer, EventExtent extent)
-      : source_(std::move(source)), packer_(std::move(packer)), extent_(extent) {}
-
-  Expected<bool> next(EventPacket& packet) override { return packer_.next(packet); }
-  ImageSize size() const override { return packer_.size(); }
-  EventExtent extent() const override { return extent_; }
-
- private:
-  std::unique_ptr<Source> source_;
-  EventPacker packer_;
-  EventExtent extent_;
-};
-
 }  // namespace
 
 Expected<std::unique_ptr<EventReader>> open_events_text(const std::string& path,
@@ -315,15 +300,13 @@ Expected<std::unique_ptr<EventReader>> open_events_text(const std::string& path,
   if (!last) return last.error();
   auto lines = LineReader::open(path);
   if (!lines) return lines.error();
-  auto source = std::make_unique<Source>(*std::move(lines), *layout);
+  auto source = std::make_shared<Source>(*std::move(lines), *layout);
   const ImageSize size = options.size == ImageSize{} ? sample->size : options.size;
-  auto packer = EventPacker::make(path, options, size,
-                                  [s = source.get()](RawEvents& block) { return s->fetch(block); });
+  auto packer =
+      EventPacker::make(path, options, size, [source](RawEvents& block) { return source->fetch(block); });
   if (!packer) return packer.error();
-  const std::int64_t last_us = std::clamp(*last, first, kLargestTimeUs);
-  const EventExtent extent{first * kNsPerUs + options.offset_ns, last_us * kNsPerUs + options.offset_ns, -1};
-  return std::unique_ptr<EventReader>(
-      std::make_unique<EventReaderText>(std::move(source), *std::move(packer), extent));
+  const auto extent = make_extent(first, std::clamp(*last, first, kLargestTimeUs), -1, options);
+  return make_packed_reader(*std::move(packer), [extent] { return extent; });
 }
 
 }  // namespace evpose

@@ -6,29 +6,17 @@
 #include <bit>
 #include <cstring>
 
+#include "evpose/io/events/evt3_words.h"
+
 namespace evpose {
 namespace {
-
-enum Kind : unsigned {
-  kAddressY = 0x0,
-  kAddressX = 0x2,
-  kVectorBase = 0x3,
-  kVector12 = 0x4,
-  kVector8 = 0x5,
-  kTimeLow = 0x6,
-  kContinued4 = 0x7,
-  kTimeHigh = 0x8,
-  kTrigger = 0xA,
-  kOthers = 0xE,
-  kContinued12 = 0xF,
-};
 
 constexpr std::int64_t kLoopUs = 1 << 24;
 constexpr unsigned kHighs = 4096;
 /// Steps back, in units of the high part, that cameras are known to make without having lost the time.
 constexpr unsigned kHiccup = 10;
 constexpr std::size_t kWidestVector = 12;
-/// None of these bits is set in words of the kinds kAddressY and kAddressX.
+/// None of these bits is set in words of the kinds Evt3Word::kAddressY and Evt3Word::kAddressX.
 constexpr unsigned kRowOrEvent = 0xD000;
 
 /// Four events in one register, where the processor has such wide ones.
@@ -100,16 +88,16 @@ std::size_t Evt3Decoder::begin(const std::byte* bytes, std::size_t words) {
   for (std::size_t i = 0; i < words; ++i) {
     const unsigned word = load(bytes, i);
     switch (word >> 12) {
-      case kAddressY:
+      case Evt3Word::kAddressY:
         set_y(word);
         break;
-      case kVectorBase:
+      case Evt3Word::kVectorBase:
         set_base(word);
         break;
-      case kTimeHigh:
+      case Evt3Word::kTimeHigh:
         set_high(word & 0xFFF);
         break;
-      case kTimeLow:
+      case Evt3Word::kTimeLow:
         if (!has_high_) break;
         now_us_ = high_us_ + (word & 0xFFF);
         started_ = true;
@@ -130,7 +118,7 @@ bool Evt3Decoder::has_room(const EventBlock& block) const {
 /// data, which is what makes it fast. Stops at any other word, at an event outside, and where the block is
 /// full.
 std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventBlock& block) {
-  const unsigned same_high = kTimeHigh << 12 | high_, width = width_, height = height_;
+  const unsigned same_high = Evt3Word::kTimeHigh << 12 | high_, width = width_, height = height_;
   const std::int64_t high_dt = high_us_ - block.base_us;
   std::int64_t dt = now_us_ - block.base_us;
   unsigned y = y_, base_x = base_x_, base_on = base_on_;
@@ -148,18 +136,18 @@ std::size_t Evt3Decoder::plain(const std::byte* bytes, std::size_t words, EventB
       *out = event_of_bits(event_bits(static_cast<std::uint32_t>(dt), 0, y, 0) + (place << 32));
       out += is_event;
       y = (y & ~is_row) | (value & is_row);
-    } else if (kind == kVectorBase) {
+    } else if (kind == Evt3Word::kVectorBase) {
       base_x = value;
       base_on = word >> 11 & 1;
-    } else if (kind == kVector12 || kind == kVector8) {
-      const unsigned mask = word & (kind == kVector12 ? 0xFFFu : 0xFFu);
+    } else if (kind == Evt3Word::kVector12 || kind == Evt3Word::kVector8) {
+      const unsigned mask = word & (kind == Evt3Word::kVector12 ? 0xFFFu : 0xFFu);
       if (base_x + static_cast<unsigned>(std::bit_width(mask)) > width || y >= height) break;
       const std::uint64_t first = event_bits(static_cast<std::uint32_t>(dt), base_x, y, base_on);
       out = write_quad(first, mask & 0xF, out);
       out = write_quad(first + (std::uint64_t{4} << 32), mask >> 4 & 0xF, out);
       out = write_quad(first + (std::uint64_t{8} << 32), mask >> 8, out);
-      base_x = (base_x + (kind == kVector12 ? 12 : 8)) & 0xFFFF;
-    } else if (kind == kTimeLow) {
+      base_x = (base_x + (kind == Evt3Word::kVector12 ? 12 : 8)) & 0xFFFF;
+    } else if (kind == Evt3Word::kTimeLow) {
       const std::int64_t told = high_dt + (word & 0xFFF);
       if (told < dt) break;
       dt = told;
@@ -180,11 +168,11 @@ std::size_t Evt3Decoder::held(const std::byte* bytes, std::size_t words, EventBl
   std::size_t i = 0;
   for (; i < words && now_us_ < last_us_ && block.count < block.events.size(); ++i) {
     const unsigned word = load(bytes, i), kind = word >> 12;
-    if (kind == kTimeLow) {
+    if (kind == Evt3Word::kTimeLow) {
       now_us_ = high_us_ + (word & 0xFFF);
-    } else if (kind == kAddressY) {
+    } else if (kind == Evt3Word::kAddressY) {
       set_y(word);
-    } else if (kind == kAddressX) {
+    } else if (kind == Evt3Word::kAddressX) {
       const unsigned x = word & 0x7FF;
       const auto dt = static_cast<std::uint32_t>(last_us_ - block.base_us);
       block.events[block.count] = event_of_bits(event_bits(dt, x, y_, word >> 11 & 1));
@@ -233,31 +221,31 @@ std::size_t Evt3Decoder::decode(std::span<const std::byte> bytes, EventBlock& bl
     if (i == words || !has_room(block)) break;
     const unsigned word = load(bytes.data(), i++), value = word & 0xFFF;
     switch (word >> 12) {
-      case kAddressX:  // plain() stops only at one outside
+      case Evt3Word::kAddressX:  // plain() stops only at one outside
         ++faults_.outside;
         break;
-      case kTimeLow:
+      case Evt3Word::kTimeLow:
         now_us_ = high_us_ + value;
         break;
-      case kVectorBase:
+      case Evt3Word::kVectorBase:
         set_base(word);
         break;
-      case kVector12:
+      case Evt3Word::kVector12:
         vector(value, 12, block);
         break;
-      case kVector8:
+      case Evt3Word::kVector8:
         vector(value & 0xFF, 8, block);
         break;
-      case kTimeHigh:
+      case Evt3Word::kTimeHigh:
         set_high(value);
         break;
-      case kTrigger:
+      case Evt3Word::kTrigger:
         if (triggers != nullptr)
           triggers->push_back({now_us_ * kNsPerUs, (word & 1) != 0, static_cast<int>(word >> 8 & 0xF)});
         break;
-      case kOthers:
-      case kContinued4:
-      case kContinued12:
+      case Evt3Word::kOthers:
+      case Evt3Word::kContinued4:
+      case Evt3Word::kContinued12:
         break;
       default:
         ++faults_.skipped_words;

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "evpose/core/log.h"
+#include "evpose/io/events/test_columns.h"
 #include "evpose/io/files/test_files.h"
-#include "evpose/io/files/test_sha3.h"
 #include "evpose/io/formats/open_events.h"
 
 namespace evpose {
@@ -24,11 +24,7 @@ Json answers_of(const std::string& name) {
   return Json::parse(content_of(formats_folder() + "known_answers.json")).at(name);
 }
 
-/// The columns of a file as the answers have them.
-struct Columns {
-  std::vector<std::uint64_t> t_us;
-  std::vector<std::uint16_t> x, y;
-  std::vector<std::uint8_t> p;
+struct Columns : EventColumns {
   std::string error;
   ImageSize size;
   EventExtent extent;
@@ -43,30 +39,12 @@ Columns read_columns(const std::string& name, const EventReadOptions& options = 
   }
   c.size = (*reader)->size();
   c.extent = (*reader)->extent();
-  EventPacket packet;
-  while (true) {
-    const auto more = (*reader)->next(packet);
-    if (!more) c.error = more.error().line();
-    if (!more || !*more) return c;
-    for (const Event& e : packet.events) {
-      c.t_us.push_back(static_cast<std::uint64_t>(packet.time(e) / kNsPerUs));
-      c.x.push_back(e.x);
-      c.y.push_back(e.y);
-      c.p.push_back(e.on);
-    }
-  }
-}
-
-template <class T>
-std::string digest(const std::vector<T>& column) {
-  return sha3_224(std::as_bytes(std::span(column)));
-}
-
-template <class T>
-std::uint64_t sum(const std::vector<T>& column) {
-  std::uint64_t total = 0;
-  for (const T value : column) total += value;
-  return total;
+  auto columns = read_columns(**reader);
+  if (columns)
+    static_cast<EventColumns&>(c) = *std::move(columns);
+  else
+    c.error = columns.error().line();
+  return c;
 }
 
 struct File {

@@ -1,23 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <map>
 
 #include "evpose/core/version.h"
-#include "evpose/io/bags/bag_container_writer.h"
+#include "evpose/io/bags/chunked_bag_writer.h"
 #include "evpose/io/bags/mcap.h"
 #include "evpose/io/bags/message_definitions.h"
-#include "evpose/io/bags/message_writer.h"
-#include "evpose/io/files/atomic_file.h"
+#include "evpose/io/files/byte_stream.h"
 #include "evpose/io/files/crc32.h"
 
 namespace evpose {
 namespace {
 
 constexpr std::size_t kChunkBytes = 1 << 20;
-
-std::string_view text_of(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 std::string_view name_of(Compression compression) {
   return compression == Compression::lz4 ? "lz4" : compression == Compression::zstd ? "zstd" : "";
@@ -32,10 +26,11 @@ void append_record(MessageWriter& out, McapOp op, const MessageWriter& content) 
 /// "sensor_msgs/Imu" as ROS 2 names it.
 std::string ros2_type(std::string type) { return type.insert(type.find('/') + 1, "msg/"); }
 
-class McapWriter : public BagContainerWriter {
+class McapWriter : public ChunkedBagWriter {
  public:
-  McapWriter(AtomicFile file, Compression compression) : file_(std::move(file)), compression_(compression) {
-    put(std::string_view(reinterpret_cast<const char*>(kMcapMagic.data()), kMcapMagic.size()));
+  McapWriter(AtomicFile file, Compression compression)
+      : ChunkedBagWriter(std::move(file), compression, kChunkBytes) {
+    put_magic();
     MessageWriter header;
     header.string("ros2");
     header.string(text("evpose ", version()));
@@ -43,55 +38,33 @@ class McapWriter : public BagContainerWriter {
   }
 
   Wire wire() const override { return Wire::cdr; }
-  std::size_t add_topic(const std::string& name, const std::string& type) override {
-    topics_.push_back({name, type});
-    return topics_.size() - 1;
-  }
-  void write(std::size_t topic, TimeNs t, std::span<const std::byte> message) override;
   Status finish() override;
 
  private:
-  struct Topic {
-    std::string name, type;
-    bool described = false;
-    std::uint32_t messages = 0;
-  };
-  struct Entry {
-    TimeNs t = 0;
-    std::uint64_t offset = 0;
-  };
-  struct ChunkIndex {
-    TimeNs first = INT64_MAX, last = INT64_MIN;
-    std::uint64_t start = 0, length = 0, index_length = 0, stored = 0, size = 0;
-    std::map<std::size_t, std::uint64_t> index_offsets;  ///< by topic
-  };
-
-  void put(std::string_view bytes) {
-    file_.write(bytes);
+  void append_topic(MessageWriter& chunk, std::size_t topic) const override;
+  void append_message(MessageWriter& chunk, std::size_t topic, TimeNs t,
+                      std::span<const std::byte> message) const override;
+  void put_chunk(const Chunk& chunk, std::span<const std::byte> unpacked,
+                 std::span<const std::byte> stored) override;
+  void put_index(std::size_t topic, const std::vector<IndexEntry>& entries) override;
+  void put(std::string_view bytes) override {
+    ChunkedBagWriter::put(bytes);
     crc_ = crc32(bytes.data(), bytes.size(), crc_);
-    position_ += bytes.size();
   }
+
+  void put_magic() { put({reinterpret_cast<const char*>(kMcapMagic.data()), kMcapMagic.size()}); }
   void put_record(McapOp op, const MessageWriter& content) {
     MessageWriter record;
     append_record(record, op, content);
-    put(text_of(record.data()));
+    put(as_text(record.data()));
   }
   MessageWriter schema(std::size_t topic) const;
   MessageWriter channel(std::size_t topic) const;
   MessageWriter statistics() const;
-  MessageWriter chunk_index(const ChunkIndex& chunk) const;
-  void flush();
-  void put_message_indexes(ChunkIndex& info);
+  MessageWriter chunk_index(const Chunk& chunk) const;
   void put_summary();
 
-  AtomicFile file_;
-  Compression compression_;
-  std::vector<Topic> topics_;
-  std::uint64_t position_ = 0;
-  std::uint32_t crc_ = 0;
-  MessageWriter chunk_;
-  std::map<std::size_t, std::vector<Entry>> index_;  ///< of the open chunk, by topic
-  std::vector<ChunkIndex> chunks_;
+  std::uint32_t crc_ = 0;  ///< of what was put since it was set to 0
 };
 
 std::uint16_t id_of(std::size_t topic) { return static_cast<std::uint16_t>(topic + 1); }
@@ -116,71 +89,45 @@ MessageWriter McapWriter::channel(std::size_t topic) const {
   return out;
 }
 
-void McapWriter::write(std::size_t topic, TimeNs t, std::span<const std::byte> message) {
-  Topic& known = topics_[topic];
-  if (!known.described) {
-    append_record(chunk_, McapOp::schema, schema(topic));
-    append_record(chunk_, McapOp::channel, channel(topic));
-    known.described = true;
-  }
-  index_[topic].push_back({t, chunk_.size()});
+void McapWriter::append_topic(MessageWriter& chunk, std::size_t topic) const {
+  append_record(chunk, McapOp::schema, schema(topic));
+  append_record(chunk, McapOp::channel, channel(topic));
+}
+
+void McapWriter::append_message(MessageWriter& chunk, std::size_t topic, TimeNs t,
+                                std::span<const std::byte> message) const {
   MessageWriter content;
   content.u16(id_of(topic));
-  content.u32(known.messages++);
+  content.u32(topics_[topic].messages);
   content.u64(static_cast<std::uint64_t>(t));
   content.u64(static_cast<std::uint64_t>(t));
   content.bytes(message);
-  append_record(chunk_, McapOp::message, content);
-  if (chunk_.size() >= kChunkBytes) flush();
+  append_record(chunk, McapOp::message, content);
 }
 
-void McapWriter::put_message_indexes(ChunkIndex& info) {
-  for (auto& [topic, entries] : index_) {
-    std::stable_sort(entries.begin(), entries.end(),
-                     [](const Entry& a, const Entry& b) { return a.t < b.t; });
-    info.first = std::min(info.first, entries.front().t);
-    info.last = std::max(info.last, entries.back().t);
-    MessageWriter pairs;
-    for (const Entry& entry : entries) {
-      pairs.u64(static_cast<std::uint64_t>(entry.t));
-      pairs.u64(entry.offset);
-    }
-    MessageWriter content;
-    content.u16(id_of(topic));
-    content.byte_sequence(pairs.data());
-    info.index_offsets[topic] = position_;
-    put_record(McapOp::message_index, content);
-  }
-}
-
-void McapWriter::flush() {
-  if (chunk_.size() == 0) return;
-  ChunkIndex info;
-  for (const auto& [topic, entries] : index_) {
-    for (const Entry& entry : entries) {
-      info.first = std::min(info.first, entry.t);
-      info.last = std::max(info.last, entry.t);
-    }
-  }
-  const auto stored = compress(compression_, chunk_.data());
-  info.start = position_;
-  info.size = chunk_.size();
-  info.stored = stored.size();
+void McapWriter::put_chunk(const Chunk& chunk, std::span<const std::byte> unpacked,
+                           std::span<const std::byte> stored) {
   MessageWriter content;
-  content.u64(static_cast<std::uint64_t>(info.first));
-  content.u64(static_cast<std::uint64_t>(info.last));
-  content.u64(info.size);
-  content.u32(crc32(chunk_.data().data(), chunk_.size()));
+  content.u64(static_cast<std::uint64_t>(chunk.first));
+  content.u64(static_cast<std::uint64_t>(chunk.last));
+  content.u64(chunk.size);
+  content.u32(crc32(unpacked.data(), unpacked.size()));
   content.string(name_of(compression_));
-  content.u64(info.stored);
+  content.u64(chunk.stored);
   content.bytes(stored);
   put_record(McapOp::chunk, content);
-  info.length = position_ - info.start;
-  put_message_indexes(info);
-  info.index_length = position_ - info.start - info.length;
-  chunks_.push_back(std::move(info));
-  chunk_.clear();
-  index_.clear();
+}
+
+void McapWriter::put_index(std::size_t topic, const std::vector<IndexEntry>& entries) {
+  MessageWriter pairs;
+  for (const IndexEntry& entry : entries) {
+    pairs.u64(static_cast<std::uint64_t>(entry.t));
+    pairs.u64(entry.offset);
+  }
+  MessageWriter content;
+  content.u16(id_of(topic));
+  content.byte_sequence(pairs.data());
+  put_record(McapOp::message_index, content);
 }
 
 MessageWriter McapWriter::statistics() const {
@@ -192,7 +139,7 @@ MessageWriter McapWriter::statistics() const {
     counts.u16(id_of(topic));
     counts.u64(topics_[topic].messages);
   }
-  for (const ChunkIndex& chunk : chunks_) {
+  for (const Chunk& chunk : chunks_) {
     first = std::min(first, chunk.first);
     last = std::max(last, chunk.last);
   }
@@ -209,7 +156,7 @@ MessageWriter McapWriter::statistics() const {
   return out;
 }
 
-MessageWriter McapWriter::chunk_index(const ChunkIndex& chunk) const {
+MessageWriter McapWriter::chunk_index(const Chunk& chunk) const {
   MessageWriter offsets;
   for (const auto& [topic, offset] : chunk.index_offsets) {
     offsets.u16(id_of(topic));
@@ -251,22 +198,22 @@ void McapWriter::put_summary() {
   put_group(McapOp::statistics, 1, [this](std::size_t) { return statistics(); });
   put_group(McapOp::chunk_index, chunks_.size(), [this](std::size_t i) { return chunk_index(chunks_[i]); });
   const std::uint64_t offsets_start = position_;
-  put(text_of(offsets.data()));
+  put(as_text(offsets.data()));
   MessageWriter footer;  // its checksum goes up to itself
   footer.u8(static_cast<std::uint8_t>(McapOp::footer));
   footer.u64(20);
   footer.u64(start);
   footer.u64(offsets_start);
-  put(text_of(footer.data()));
+  put(as_text(footer.data()));
   MessageWriter crc;
   crc.u32(crc_);
-  put(text_of(crc.data()));
+  put(as_text(crc.data()));
 }
 
 Status McapWriter::finish() {
   flush();
   put_summary();
-  put(std::string_view(reinterpret_cast<const char*>(kMcapMagic.data()), kMcapMagic.size()));
+  put_magic();
   return file_.commit();
 }
 

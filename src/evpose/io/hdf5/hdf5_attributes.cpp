@@ -12,65 +12,33 @@ namespace {
 constexpr hssize_t kMostAttributeItems = 4096;
 constexpr std::size_t kLongestText = 1 << 20;  // bytes of all texts of an attribute
 
-Hdf5Handle own(hid_t id, herr_t (*close)(hid_t)) { return {id, close}; }
-
-struct TypePair {
-  hid_t file, memory;
-};
-
-TypePair types(NumberType type) {
-  switch (type) {
-    case NumberType::i8:
-      return {H5T_STD_I8LE, H5T_NATIVE_INT8};
-    case NumberType::u8:
-      return {H5T_STD_U8LE, H5T_NATIVE_UINT8};
-    case NumberType::i16:
-      return {H5T_STD_I16LE, H5T_NATIVE_INT16};
-    case NumberType::u16:
-      return {H5T_STD_U16LE, H5T_NATIVE_UINT16};
-    case NumberType::i32:
-      return {H5T_STD_I32LE, H5T_NATIVE_INT32};
-    case NumberType::u32:
-      return {H5T_STD_U32LE, H5T_NATIVE_UINT32};
-    case NumberType::i64:
-      return {H5T_STD_I64LE, H5T_NATIVE_INT64};
-    case NumberType::u64:
-      return {H5T_STD_U64LE, H5T_NATIVE_UINT64};
-    case NumberType::f32:
-      return {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
-    case NumberType::f64:
-      return {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE};
-  }
-  return {H5I_INVALID_HID, H5I_INVALID_HID};
-}
-
 Hdf5Handle space_of(const Hdf5Shape& shape) {
-  if (shape.empty()) return own(H5Screate(H5S_SCALAR), H5Sclose);
+  if (shape.empty()) return Hdf5Handle(H5Screate(H5S_SCALAR), H5Sclose);
   const std::vector<hsize_t> dims(shape.begin(), shape.end());
-  return own(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), H5Sclose);
+  return Hdf5Handle(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), H5Sclose);
 }
 
 Hdf5Handle text_type(std::size_t size) {
-  auto type = own(H5Tcopy(H5T_C_S1), H5Tclose);
+  auto type = Hdf5Handle(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type.get(), size);
   H5Tset_cset(type.get(), H5T_CSET_UTF8);
   return type;
 }
 
 Hdf5Handle open_attribute(hid_t file, const std::string& object, const std::string& name) {
-  return own(H5Aopen_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  return Hdf5Handle(H5Aopen_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
 }
 
 /// Number of items, or -1 when there are too many.
 hssize_t items_of(const Hdf5Handle& attribute) {
-  const auto space = own(H5Aget_space(attribute.get()), H5Sclose);
+  const auto space = Hdf5Handle(H5Aget_space(attribute.get()), H5Sclose);
   const hssize_t items = H5Sget_simple_extent_npoints(space.get());
   return items <= kMostAttributeItems ? items : -1;
 }
 
 std::optional<std::vector<std::string>> read_variable_strings(const Hdf5Handle& attribute, hssize_t items) {
   const auto type = text_type(H5T_VARIABLE);
-  const auto stored = own(H5Aget_type(attribute.get()), H5Tclose);
+  const auto stored = Hdf5Handle(H5Aget_type(attribute.get()), H5Tclose);
   H5Tset_cset(type.get(), H5Tget_cset(stored.get()));
   std::vector<char*> pointers(static_cast<std::size_t>(items), nullptr);
   if (items > 0 && H5Aread(attribute.get(), type.get(), static_cast<void*>(pointers.data())) < 0)
@@ -84,7 +52,7 @@ std::optional<std::vector<std::string>> read_variable_strings(const Hdf5Handle& 
 }
 
 std::optional<std::vector<std::string>> read_fixed_strings(const Hdf5Handle& attribute, hssize_t items) {
-  const auto type = own(H5Aget_type(attribute.get()), H5Tclose);
+  const auto type = Hdf5Handle(H5Aget_type(attribute.get()), H5Tclose);
   const std::size_t width = H5Tget_size(type.get());
   if (width == 0 || width > kLongestText || static_cast<std::size_t>(items) > kLongestText / width)
     return std::nullopt;
@@ -108,9 +76,9 @@ bool write_texts(hid_t file, const std::string& object, const std::string& name,
   for (const auto& v : values) buffer += v + std::string(width - v.size(), '\0');
   const auto type = text_type(width);
   const auto space = space_of(shape);
-  const auto attribute = own(H5Acreate_by_name(file, object.c_str(), name.c_str(), type.get(), space.get(),
-                                               H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                             H5Aclose);
+  const auto attribute = Hdf5Handle(H5Acreate_by_name(file, object.c_str(), name.c_str(), type.get(),
+                                                      space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                                    H5Aclose);
   return attribute && (values.empty() || H5Awrite(attribute.get(), type.get(), buffer.data()) >= 0);
 }
 
@@ -138,7 +106,7 @@ std::optional<std::vector<double>> Hdf5File::attribute_numbers(const std::string
                                                                const std::string& name) const {
   if (!has_attribute(object, name)) return std::nullopt;
   const auto attribute = open_attribute(id_.get(), object, name);
-  const auto type = own(H5Aget_type(attribute.get()), H5Tclose);
+  const auto type = Hdf5Handle(H5Aget_type(attribute.get()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.get());
   const hssize_t items = attribute ? items_of(attribute) : -1;
   if (items < 0 || (kind != H5T_INTEGER && kind != H5T_FLOAT) || !is_sound_number(type.get()))
@@ -152,7 +120,7 @@ std::optional<std::vector<std::string>> Hdf5File::attribute_strings(const std::s
                                                                     const std::string& name) const {
   if (!has_attribute(object, name)) return std::nullopt;
   const auto attribute = open_attribute(id_.get(), object, name);
-  const auto type = own(H5Aget_type(attribute.get()), H5Tclose);
+  const auto type = Hdf5Handle(H5Aget_type(attribute.get()), H5Tclose);
   const hssize_t items = attribute ? items_of(attribute) : -1;
   if (items < 0 || H5Tget_class(type.get()) != H5T_STRING) return std::nullopt;
   return H5Tis_variable_str(type.get()) > 0 ? read_variable_strings(attribute, items)
@@ -160,10 +128,10 @@ std::optional<std::vector<std::string>> Hdf5File::attribute_strings(const std::s
 }
 
 Status Hdf5File::make_group(const std::string& name) {
-  const auto properties = own(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+  const auto properties = Hdf5Handle(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
   H5Pset_obj_track_times(properties.get(), false);
   const auto group =
-      own(H5Gcreate2(id_.get(), name.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose);
+      Hdf5Handle(H5Gcreate2(id_.get(), name.c_str(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Gclose);
   if (!group) return failed("cannot write group " + name);
   return {};
 }
@@ -174,15 +142,16 @@ Expected<Hdf5Handle> Hdf5File::make_dataset(const std::string& name, NumberType 
   std::vector<hsize_t> dims(shape.begin(), shape.end()), most = dims, chunk = dims;
   most[0] = H5S_UNLIMITED;
   chunk[0] = chunk_rows;
-  const auto space = own(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), most.data()), H5Sclose);
-  const auto properties = own(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  const auto space =
+      Hdf5Handle(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), most.data()), H5Sclose);
+  const auto properties = Hdf5Handle(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   H5Pset_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data());
   H5Pset_shuffle(properties.get());
   H5Pset_deflate(properties.get(), 4);
   H5Pset_obj_track_times(properties.get(), false);
-  auto dataset = own(H5Dcreate2(id_.get(), name.c_str(), types(type).file, space.get(), H5P_DEFAULT,
-                                properties.get(), H5P_DEFAULT),
-                     H5Dclose);
+  auto dataset = Hdf5Handle(H5Dcreate2(id_.get(), name.c_str(), hdf5_types(type).file, space.get(),
+                                       H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+                            H5Dclose);
   if (!dataset) return failed("cannot write dataset " + name);
   return dataset;
 }
@@ -190,7 +159,7 @@ Expected<Hdf5Handle> Hdf5File::make_dataset(const std::string& name, NumberType 
 Status Hdf5File::append(const Hdf5Handle& dataset, NumberType type, std::uint64_t rows_before,
                         std::uint64_t rows, const void* data) {
   if (rows == 0) return {};
-  auto space = own(H5Dget_space(dataset.get()), H5Sclose);
+  auto space = Hdf5Handle(H5Dget_space(dataset.get()), H5Sclose);
   std::vector<hsize_t> dims(static_cast<std::size_t>(H5Sget_simple_extent_ndims(space.get())));
   H5Sget_simple_extent_dims(space.get(), dims.data(), nullptr);
   std::vector<hsize_t> offset(dims.size(), 0), extent = dims;
@@ -198,11 +167,11 @@ Status Hdf5File::append(const Hdf5Handle& dataset, NumberType type, std::uint64_
   offset[0] = rows_before;
   extent[0] = rows;
   if (H5Dset_extent(dataset.get(), dims.data()) < 0) return failed("cannot be written");
-  space = own(H5Dget_space(dataset.get()), H5Sclose);
+  space = Hdf5Handle(H5Dget_space(dataset.get()), H5Sclose);
   const auto memory =
-      own(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
+      Hdf5Handle(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
   if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, offset.data(), nullptr, extent.data(), nullptr) < 0 ||
-      H5Dwrite(dataset.get(), types(type).memory, memory.get(), space.get(), H5P_DEFAULT, data) < 0)
+      H5Dwrite(dataset.get(), hdf5_types(type).memory, memory.get(), space.get(), H5P_DEFAULT, data) < 0)
     return failed("cannot be written");
   return {};
 }
@@ -210,10 +179,11 @@ Status Hdf5File::append(const Hdf5Handle& dataset, NumberType type, std::uint64_
 Status Hdf5File::set_attribute(const std::string& object, const std::string& name, NumberType type,
                                const Hdf5Shape& shape, const void* data) {
   const auto space = space_of(shape);
-  const auto attribute = own(H5Acreate_by_name(id_.get(), object.c_str(), name.c_str(), types(type).file,
-                                               space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                             H5Aclose);
-  if (!attribute || H5Awrite(attribute.get(), types(type).memory, data) < 0)
+  const auto attribute =
+      Hdf5Handle(H5Acreate_by_name(id_.get(), object.c_str(), name.c_str(), hdf5_types(type).file,
+                                   space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                 H5Aclose);
+  if (!attribute || H5Awrite(attribute.get(), hdf5_types(type).memory, data) < 0)
     return failed("cannot write attribute " + name);
   return {};
 }

@@ -8,38 +8,11 @@
 #include <vector>
 
 #include "evpose/core/error.h"
+#include "evpose/io/hdf5/hdf5_types.h"
 
 namespace evpose {
 
 class TemporaryFile;
-
-/// Owns one identifier of the HDF5 library.
-class Hdf5Handle {
- public:
-  using Close = int (*)(std::int64_t);
-
-  Hdf5Handle() = default;
-  Hdf5Handle(std::int64_t id, Close close) : id_(id), close_(close) {}
-  Hdf5Handle(Hdf5Handle&& other) noexcept;
-  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept;
-  ~Hdf5Handle() { reset(); }
-
-  std::int64_t get() const { return id_; }
-  explicit operator bool() const { return id_ >= 0; }
-  /// False when closing failed, as it does when the disk is full.
-  bool reset();
-
- private:
-  std::int64_t id_ = -1;
-  Close close_ = nullptr;
-};
-
-enum class NumberType { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
-std::size_t size_of(NumberType type);
-
-/// Whether the bits of a stored integer or floating-point type lie within it, and are as many as numbers
-/// have. The library takes the word of a file for them, and would read and write beyond.
-bool is_sound_number(std::int64_t type);
 
 using Hdf5Shape = std::vector<std::uint64_t>;
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <random>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "evpose/io/hdf5/ecf.h"
 
@@ -102,6 +105,30 @@ inline std::string encode_ecf(std::span<const EcfEvent> events, EcfPacking packi
   encode_columns(events, out);
   encode_polarities(events, out);
   return out;
+}
+
+/// Runs of equal times and rows, and what interrupts them.
+inline std::vector<EcfEvent> some_ecf_events(std::size_t count) {
+  std::mt19937 engine(11);
+  const auto random = [&] { return static_cast<unsigned>(engine()); };
+  std::vector<EcfEvent> events(count);
+  std::int64_t t = 1'000'000;
+  unsigned x = 0, y = 0;
+  for (EcfEvent& e : events) {
+    const unsigned kind = random() % 16;
+    t += kind < 12 ? 0 : kind < 15 ? random() % 40 : random() % 3000;
+    if (kind > 4) y = random() % 720;
+    x = kind < 6 ? (x + 1 + random() % 5) % 1280 : random() % 1280;
+    e = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+         static_cast<std::int16_t>(random() / 7 % 2), t};
+  }
+  return events;
+}
+
+inline bool same_events(const std::vector<EcfEvent>& a, const std::vector<EcfEvent>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const EcfEvent& l, const EcfEvent& r) {
+    return l.x == r.x && l.y == r.y && l.p == r.p && l.t_us == r.t_us;
+  });
 }
 
 }  // namespace evpose

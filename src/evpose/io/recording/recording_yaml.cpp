@@ -31,7 +31,8 @@ class Keys {
 
  private:
   void add_files();
-  void add_streams();
+  void add_events();
+  void add_imu();
   void add_time();
   void add_frames();
   Apply file(std::optional<std::string>& target) const;
@@ -40,6 +41,8 @@ class Keys {
   Apply choice(std::vector<std::string> choices, std::function<void(const std::string&)> set) const;
   Apply seconds(std::optional<double>& target, double limit) const;
   Apply transform(std::optional<Pose>& target) const;
+  Status event_format(const YamlNode& node, const std::string& key) const;
+  Status resolution(const YamlNode& node, const std::string& key) const;
   Status initial_pose(const YamlNode& node) const;
 
   const YamlDocument& document_;
@@ -63,7 +66,8 @@ Keys::Keys(const YamlDocument& document, RecordingOverrides& out) : document_(do
       return value ? Status() : Status(value.error());
     };
   add_files();
-  add_streams();
+  add_events();
+  add_imu();
   add_time();
   add_frames();
 }
@@ -78,32 +82,15 @@ void Keys::add_files() {
   keys_["files.map"] = file(out_.map);
 }
 
-void Keys::add_streams() {
-  keys_["events.format"] = [this](const YamlNode& node, const std::string& key) -> Status {
-    const auto value = document_.string(node, key);
-    if (!value) return value.error();
-    const auto formats = event_formats();
-    std::string known;
-    for (const EventFormat& format : formats) known += (known.empty() ? "" : ", ") + std::string(format.name);
-    if (std::none_of(formats.begin(), formats.end(),
-                     [&](const auto& format) { return *value == format.name; }))
-      return document_.error(node, key + ": '" + *value + "' is unknown", "use one of " + known);
-    out_.events_format = *value;
-    return {};
+void Keys::add_events() {
+  keys_["events.format"] = [this](const YamlNode& node, const std::string& key) {
+    return event_format(node, key);
   };
   keys_["events.topic"] = text_value(out_.event_options.topic);
-  keys_["imu.topic"] = text_value(out_.imu_topic);
   keys_["events.time_unit"] =
       choice({"us", "ns", "s"}, [this](const auto& v) { out_.event_options.time_unit = v; });
-  keys_["events.resolution"] = [this](const YamlNode& node, const std::string& key) -> Status {
-    const auto size = document_.numbers(node, key, 2);
-    if (!size) return size.error();
-    for (const double n : *size)
-      if (n < 1 || n > 32767 || n != std::floor(n))
-        return document_.error(node, text(key, ": ", n, " is not a number of pixels"),
-                               "write [width, height]");
-    out_.event_options.size = {static_cast<int>((*size)[0]), static_cast<int>((*size)[1])};
-    return {};
+  keys_["events.resolution"] = [this](const YamlNode& node, const std::string& key) {
+    return resolution(node, key);
   };
   keys_["events.flip_x"] = flag(out_.event_options.flip_x);
   keys_["events.flip_y"] = flag(out_.event_options.flip_y);
@@ -116,6 +103,10 @@ void Keys::add_streams() {
     out_.camera_index = static_cast<int>(*index);
     return {};
   };
+}
+
+void Keys::add_imu() {
+  keys_["imu.topic"] = text_value(out_.imu_topic);
   keys_["imu.time_unit"] = choice({"ns", "us", "s"}, [this](const auto& v) {
     out_.imu_options.time_unit = v;
     out_.states_imu_layout = true;
@@ -254,6 +245,30 @@ Apply Keys::transform(std::optional<Pose>& target) const {
     target = *value;
     return {};
   };
+}
+
+Status Keys::event_format(const YamlNode& node, const std::string& key) const {
+  const auto value = document_.string(node, key);
+  if (!value) return value.error();
+  std::string known;
+  for (const EventFormat& format : event_formats()) {
+    if (*value == format.name) {
+      out_.events_format = *value;
+      return {};
+    }
+    known += (known.empty() ? "" : ", ") + std::string(format.name);
+  }
+  return document_.error(node, key + ": '" + *value + "' is unknown", "use one of " + known);
+}
+
+Status Keys::resolution(const YamlNode& node, const std::string& key) const {
+  const auto size = document_.numbers(node, key, 2);
+  if (!size) return size.error();
+  for (const double n : *size)
+    if (n < 1 || n > 32767 || n != std::floor(n))
+      return document_.error(node, text(key, ": ", n, " is not a number of pixels"), "write [width, height]");
+  out_.event_options.size = {static_cast<int>((*size)[0]), static_cast<int>((*size)[1])};
+  return {};
 }
 
 Status Keys::initial_pose(const YamlNode& node) const {

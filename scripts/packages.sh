@@ -12,7 +12,6 @@ build=(
   ninja-build          # what the presets build with
   ccache               # a second build takes seconds
   libeigen3-dev        # linear algebra
-  libceres-dev         # the reference solver
   libhdf5-dev          # recordings and maps
   libyaml-cpp-dev      # calibrations and configuration
   libcli11-dev         # command line
@@ -30,6 +29,7 @@ build=(
 )
 test=(
   libgtest-dev         # unit tests
+  libceres-dev         # the solver that ours are compared with
   libbenchmark-dev     # speed of the hot kernels
   python3              # layer and end-to-end tests
   python3-numpy        # the independent scorer

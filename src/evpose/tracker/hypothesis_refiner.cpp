@@ -11,7 +11,7 @@ namespace {
 
 // From the accuracy of the coarse search to the gate of the tracker.
 constexpr std::array<double, 4> kGates_px{3, 1.5, 0.8, 0.5};
-constexpr int kStepsPerGate = 3;           // Gauss-Newton; more do not move the pose
+constexpr int kStepsPerGate = 3;           // of Gauss-Newton, each with a new association
 constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band is wider than its gate
 constexpr double kInterval_s = 0.008;      // contours hardly turn in it
 constexpr std::size_t kIntervals = 5;      // looked at together: with fewer, velocity drifts from the truth

@@ -8,7 +8,7 @@ namespace evpose {
 namespace {
 
 // Process noise of a vehicle without an IMU.
-constexpr double kVelocityNoise_m2_s3 = 10;  // accelerations of some g, changing within a tenth of a second
+constexpr double kVelocityNoise_m2_s3 = 10;  // accelerations of 7 m/s^2 that last a tenth of a second
 constexpr double kRotationNoise_rad2_s2 = 0.1, kUnknownRate_rad2_s2 = 1.0;
 
 // Hypotheses nearer to each other than this are one.

@@ -3,14 +3,14 @@
 
 #include <random>
 
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose {
 namespace {
 
 EventPacket packet(TimeNs base, std::initializer_list<Event> events) { return {base, events}; }
 
-std::vector<std::uint32_t> contents(const EventFront& front) {
+std::vector<std::uint32_t> contents(const EventPreprocessor& front) {
   std::vector<std::uint32_t> out;
   for (int y = 0; y < front.surface()->height(); ++y)
     for (int x = 0; x < front.surface()->width(); ++x)
@@ -31,9 +31,9 @@ EventPacket random_events(int n, unsigned width, unsigned height, unsigned step_
 }
 
 TEST(NoiseFilter, KeepsAnEventOnlyWithARecentNeighbour) {
-  EventFrontConfig config;
-  config.filter.support_min_s = config.filter.support_max_s = 5e-3;
-  EventFront front(20, 20, config);
+  EventPreprocessorConfig config;
+  config.noise.support_min_s = config.noise.support_max_s = 5e-3;
+  EventPreprocessor front(20, 20, config);
   front.keep_surface(true);
   const auto p = packet(kNsPerS, {{0, 5, 5, 1},        // first of all: no support
                                   {5000, 6, 6, 0},     // neighbour 5 ms ago: kept
@@ -86,8 +86,8 @@ TEST(TimeSurface, KeepsTheLastEventOfEachPolarity) {
   EXPECT_EQ(s.last(1, 2, Polarity::off), 2000u);
 }
 
-TEST(EventFront, TheSurfaceHoldsWhatWasKeptSinceItWasAskedFor) {
-  EventFront front(20, 20, {});
+TEST(EventPreprocessor, TheSurfaceHoldsWhatWasKeptSinceItWasAskedFor) {
+  EventPreprocessor front(20, 20, {});
   const auto first = packet(0, {{10, 5, 5, 1}, {11, 6, 5, 1}}), second = packet(0, {{20, 5, 6, 1}});
   front.take(first, first.events);
   EXPECT_EQ(front.surface(), nullptr);
@@ -99,9 +99,9 @@ TEST(EventFront, TheSurfaceHoldsWhatWasKeptSinceItWasAskedFor) {
   EXPECT_EQ(front.surface(), nullptr);
 }
 
-TEST(EventFront, IsTheSameHoweverThePacketsAreCut) {
+TEST(EventPreprocessor, IsTheSameHoweverThePacketsAreCut) {
   const EventPacket all = random_events(20000, 40, 30, 30);
-  EventFront whole(40, 30, {}), cut(40, 30, {});
+  EventPreprocessor whole(40, 30, {}), cut(40, 30, {});
   whole.keep_surface(true);
   cut.keep_surface(true);
   whole.take(all, all.events);
@@ -118,8 +118,8 @@ TEST(EventFront, IsTheSameHoweverThePacketsAreCut) {
   EXPECT_EQ(contents(whole), contents(cut));
 }
 
-TEST(EventFront, ClockSurvivesHoursOfData) {
-  EventFront front(10, 10, {});
+TEST(EventPreprocessor, ClockSurvivesHoursOfData) {
+  EventPreprocessor front(10, 10, {});
   front.keep_surface(true);
   TimeNs t = 1'700'000'000 * kNsPerS;
   for (int minute = 0; minute < 200; ++minute, t += 60 * kNsPerS) {
@@ -131,11 +131,11 @@ TEST(EventFront, ClockSurvivesHoursOfData) {
 }
 
 /// A burst of 40 Mev/s for 20 ms into a front that takes 4: a bounded number passes, from everywhere.
-TEST(EventFront, ABurstIsShedEvenlyAndCounted) {
+TEST(EventPreprocessor, ABurstIsShedEvenlyAndCounted) {
   constexpr int kSide = 64, kEvents = 800'000;
-  EventFrontConfig config;
+  EventPreprocessorConfig config;
   config.most_mev_s = 4;
-  EventFront front(kSide, kSide, config);
+  EventPreprocessor front(kSide, kSide, config);
   EventPacket burst;
   for (int i = 0; i < kEvents; ++i)
     burst.events.push_back(
@@ -146,21 +146,21 @@ TEST(EventFront, ABurstIsShedEvenlyAndCounted) {
   EXPECT_GT(passed, 4 * 20000 * 0.9);
   EXPECT_LT(passed, 4 * (20000 + 5000) * 1.1);
   int upper = 0;
-  for (const FrontEvent& e : front.kept()) upper += e.y < kSide / 2;
+  for (const FilteredEvent& e : front.kept()) upper += e.y < kSide / 2;
   EXPECT_NEAR(upper, 0.5 * static_cast<double>(front.kept().size()), 0.02 * passed);
 }
 
-TEST(EventFront, BelowTheLimitNothingIsShed) {
-  EventFrontConfig config;
+TEST(EventPreprocessor, BelowTheLimitNothingIsShed) {
+  EventPreprocessorConfig config;
   config.most_mev_s = 1;
-  EventFront front(40, 30, config);
+  EventPreprocessor front(40, 30, config);
   const EventPacket p = random_events(20000, 40, 30, 2);  // half a million events a second
   front.take(p, p.events);
   EXPECT_EQ(front.counts().shed, 0);
 }
 
-TEST(EventFront, EventsOutsideTheImageAreCountedAndLeftOut) {
-  EventFront front(10, 10, {});
+TEST(EventPreprocessor, EventsOutsideTheImageAreCountedAndLeftOut) {
+  EventPreprocessor front(10, 10, {});
   const auto p = packet(0, {{0, 10, 4, 1}, {1, 4, 10, 1}, {2, 40000, 9, 1}});
   front.take(p, p.events);
   EXPECT_EQ(front.counts().outside, 3);

@@ -45,17 +45,9 @@ Eigen::Vector2d half_view(const Camera& camera) {
 
 void describe(ConfigTable& table, VisibleSetConfig& c) {
   table.add("far_m", c.far_m, "m", "points further away are left out", {0.1, 1e5});
-  table.add("near_m", c.near_m, "m", "points nearer than this are left out", {1e-3, 100});
   table.add("stride_px", c.stride_px, "px", "least distance of two points along one contour", {1, 1000});
   table.add("budget", c.budget, "", "most points in all", {6, 65535});
-  table.add("margin_px", c.margin_px, "px",
-            "points may lie this far outside of the image when chosen, if it is 640 wide", {0, 1000});
-  table.add("refresh_px", c.refresh_px, "px",
-            "points are chosen again when the view has moved by this much, in an image 640 wide", {0, 1000});
-  table.add("updates", c.updates, "", "updates that a choice takes", {1, 1000});
   table.add("occlusion", c.occlusion, "leave out points behind the map's occluders, if it has any");
-  table.add("grazing_sin", c.grazing_sin, "", "least sine of the angle between contour and line of sight",
-            {0, 1});
 }
 
 VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& config,

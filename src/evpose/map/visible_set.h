@@ -17,16 +17,17 @@ namespace evpose {
 class ConfigTable;
 
 struct VisibleSetConfig {
-  double far_m = 40;       ///< points further away are left out
-  double near_m = 0.1;     ///< points nearer are left out
-  double stride_px = 6;    ///< least distance of two points along one contour, in the image
-  int budget = 6000;       ///< most points in all
-  double margin_px = 20;   ///< points may lie this far outside of the image when chosen, if it is 640 wide
-  double refresh_px = 16;  ///< chosen again before the view has moved by this much, in an image 640 wide
-  int updates = 6;         ///< that a choice takes, fewer in fast motion
-  bool occlusion = true;   ///< leave out points behind the map's occluders, if it has any
-  double grazing_sin =
-      0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
+  double far_m = 40;      ///< points further away are left out
+  double stride_px = 6;   ///< least distance of two points along one contour, in the image
+  int budget = 6000;      ///< most points in all
+  bool occlusion = true;  ///< leave out points behind the map's occluders, if it has any
+
+  // Not for users: the relocalizer and tests differ in these. Lengths hold for an image 640 wide.
+  double near_m = 0.1;        ///< points nearer are left out: no camera is sharp there
+  double margin_px = 20;      ///< points may lie this far outside of the image when chosen
+  double refresh_px = 16;     ///< chosen again before the view has moved by this much: less than the margin
+  int updates = 6;            ///< that a choice takes, fewer in fast motion
+  double grazing_sin = 0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
 };
 void describe(ConfigTable& table, VisibleSetConfig& config);
 

@@ -88,7 +88,7 @@ AssociationIndex::Owner AssociationIndex::find(float x, float y, float age_us) c
   return n < 2 ? nearest : resolve(nearest, {hits, static_cast<std::size_t>(n)});
 }
 
-void AssociationIndex::find_all(std::span<const FrontEvent> events, std::uint32_t now_us,
+void AssociationIndex::find_all(std::span<const FilteredEvent> events, std::uint32_t now_us,
                                 std::vector<Found>* found) {
   // Most events are far from any contour: written in any case and kept by counting, as a branch would be
   // guessed wrong.
@@ -103,12 +103,12 @@ void AssociationIndex::find_all(std::span<const FrontEvent> events, std::uint32_
     find_eight(events, {&close_[begin], std::min(kSide, count - begin)}, now_us, found);
 }
 
-void AssociationIndex::find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
+void AssociationIndex::find_eight(std::span<const FilteredEvent> events, std::span<const std::uint32_t> which,
                                   std::uint32_t now_us, std::vector<Found>* found) const {
   std::array<std::size_t, kSide> entry{};
   Floats x{}, y{}, age{};
   for (std::size_t l = 0; l < which.size(); ++l) {
-    const FrontEvent& e = events[which[l]];
+    const FilteredEvent& e = events[which[l]];
     x[l] = e.x, y[l] = e.y, age[l] = static_cast<float>(now_us - e.stamp_us);
     entry[l] = static_cast<std::size_t>(heads_[cell_of(e.x, e.y)]);
   }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evpose/camera/camera.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose {
 
@@ -43,7 +43,7 @@ class AssociationIndex {
   };
   /// The events that a band owns, in their order; `now_us`: of the bands, on the events' clock. As find()
   /// for each, eight side by side, which differs by rounding.
-  void find_all(std::span<const FrontEvent> events, std::uint32_t now_us, std::vector<Found>* found);
+  void find_all(std::span<const FilteredEvent> events, std::uint32_t now_us, std::vector<Found>* found);
 
  private:
   static constexpr int kCell_px = 8, kMostHits = 16;  // more than so many bands at one place are a tangle
@@ -54,7 +54,7 @@ class AssociationIndex {
   struct Entry {
     std::int32_t band, next;
   };
-  void find_eight(std::span<const FrontEvent> events, std::span<const std::uint32_t> which,
+  void find_eight(std::span<const FilteredEvent> events, std::span<const std::uint32_t> which,
                   std::uint32_t now_us, std::vector<Found>* found) const;
   Owner resolve(const Owner& nearest, std::span<const Hit> hits) const;
   std::size_t cell_of(float x, float y) const {

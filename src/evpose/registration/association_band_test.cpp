@@ -135,8 +135,8 @@ TEST(AssociationIndex, ManyEventsFindWhatEachFindsAlone) {
   AssociationIndex index = index_of(bands);
   constexpr std::uint32_t kNow_us = 3;  // the clock has just begun anew
   for (const std::size_t count : {0, 3, 8, 9, 20003}) {
-    std::vector<FrontEvent> events(count);
-    for (FrontEvent& e : events) {
+    std::vector<FilteredEvent> events(count);
+    for (FilteredEvent& e : events) {
       const Place p = random.place();
       e.stamp_us = kNow_us - static_cast<std::uint32_t>(p.age_us);
       e.x = static_cast<std::uint16_t>(p.x);
@@ -146,7 +146,7 @@ TEST(AssociationIndex, ManyEventsFindWhatEachFindsAlone) {
     index.find_all(events, kNow_us, &found);
     std::size_t next = 0, rounded = 0;
     for (std::uint32_t k = 0; k < count; ++k) {
-      const FrontEvent& e = events[k];
+      const FilteredEvent& e = events[k];
       const Place p{static_cast<float>(e.x), static_cast<float>(e.y),
                     static_cast<float>(kNow_us - e.stamp_us)};
       const auto alone = index.find(p.x, p.y, p.age_us);

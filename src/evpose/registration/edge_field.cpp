@@ -41,9 +41,9 @@ int EdgeField::direction(double x, double y) {
   return static_cast<int>(std::floor((turn + 1) * kDirections + 0.5)) % kDirections;
 }
 
-void EdgeField::build(std::span<const FrontEvent> events) {
+void EdgeField::build(std::span<const FilteredEvent> events) {
   std::fill(active_.begin(), active_.end(), std::uint8_t{0});
-  for (const FrontEvent& e : events)
+  for (const FilteredEvent& e : events)
     active_[static_cast<std::size_t>(e.y / cell_) * static_cast<std::size_t>(columns_) +
             static_cast<std::size_t>(e.x / cell_)] = 1;
   for (Plane& plane : planes_) std::fill(plane.begin(), plane.end(), kReach_px);

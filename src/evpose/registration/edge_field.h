@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "evpose/camera/camera.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose {
 
@@ -26,7 +26,7 @@ class EdgeField {
   explicit EdgeField(ImageSize size);
 
   /// Events in any order; those whose neighbours do not form a line are left out.
-  void build(std::span<const FrontEvent> events);
+  void build(std::span<const FilteredEvent> events);
 
   /// Direction bin of a line along (x, y).
   static int direction(double x, double y);

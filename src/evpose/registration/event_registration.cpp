@@ -146,7 +146,7 @@ void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationRes
   if (p.verdicts) owners_.assign(p.events.size(), -1);
   index_.find_all(p.events, p.now_us, &found_);
   for (const auto& [k, owner] : found_) {
-    const FrontEvent& e = p.events[k];
+    const FilteredEvent& e = p.events[k];
     const auto set_verdict = [&, k = k, band = owner.band](EventVerdict v) {
       if (p.verdicts) (*p.verdicts)[k] = v, owners_[k] = band;
     };

@@ -8,7 +8,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/core/pose.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 #include "evpose/registration/association_band.h"
 #include "evpose/registration/contrast_memory.h"
 #include "evpose/registration/flow_monitor.h"

@@ -52,7 +52,7 @@ class EventRegistrationLaws : public ::testing::Test {
     }
   }
   void add_event(const Eigen::Vector2d& x, double age_s) {
-    FrontEvent e{};
+    FilteredEvent e{};
     e.stamp_us = kNow - static_cast<std::uint32_t>(std::lround(age_s * 1e6));
     e.x = static_cast<std::uint16_t>(std::lround(x.x()));
     e.y = static_cast<std::uint16_t>(std::lround(x.y()) & 0x7FFF);
@@ -66,7 +66,7 @@ class EventRegistrationLaws : public ::testing::Test {
 
   EventRegistrationConfig config_;
   std::vector<ContourSample> samples_;
-  std::vector<FrontEvent> events_;
+  std::vector<FilteredEvent> events_;
   Matrix6d covariance_;
 };
 

@@ -19,7 +19,7 @@ constexpr double kMistrust_s = 0.1;   // decay time of mistrust
 
 }  // namespace
 
-FlowMonitor::Answer FlowMonitor::compare(const TimeSurface& surface, const FrontEvent& e, float nx, float ny,
+FlowMonitor::Answer FlowMonitor::compare(const TimeSurface& surface, const FilteredEvent& e, float nx, float ny,
                                          float speed_px_s) {
   if (std::abs(speed_px_s) < kFrom_px_s) return Answer::unknown;
   const float back = speed_px_s > 0 ? -kBehind_px : kBehind_px;

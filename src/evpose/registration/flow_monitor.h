@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose {
 
@@ -16,7 +16,7 @@ class FlowMonitor {
  public:
   enum class Answer : std::uint8_t { unknown, agrees, differs };
   /// Of one event near a contour with the image normal n and this speed along it.
-  static Answer compare(const TimeSurface& surface, const FrontEvent& event, float nx, float ny,
+  static Answer compare(const TimeSurface& surface, const FilteredEvent& event, float nx, float ny,
                         float speed_px_s);
 
   /// Lets what was seen so far count less.

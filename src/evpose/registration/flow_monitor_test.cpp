@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kStep_s = 1.0 / 300;
 
-FrontEvent event_at(int x, std::uint32_t stamp_us) {
-  FrontEvent e{};
+FilteredEvent event_at(int x, std::uint32_t stamp_us) {
+  FilteredEvent e{};
   e.stamp_us = stamp_us;
   e.x = static_cast<std::uint16_t>(x);
   e.y = 4;

@@ -12,8 +12,8 @@ namespace {
 
 constexpr ImageSize kSize{320, 240};
 
-FrontEvent event_at(double x, double y) {
-  FrontEvent e{};
+FilteredEvent event_at(double x, double y) {
+  FilteredEvent e{};
   e.x = static_cast<std::uint16_t>(std::lround(x));
   e.y = static_cast<std::uint16_t>(std::lround(y) & 0x7FFF);
   return e;
@@ -21,7 +21,7 @@ FrontEvent event_at(double x, double y) {
 
 TEST(EdgeField, DistanceIsThatOfTheLineAndGrowsAcrossIt) {
   EdgeField field(kSize);
-  std::vector<FrontEvent> events;
+  std::vector<FilteredEvent> events;
   for (int y = 20; y < 220; ++y) events.push_back(event_at(150, y));
   field.build(events);
   const int upright = EdgeField::direction(0, 1);
@@ -37,7 +37,7 @@ TEST(EdgeField, DistanceIsThatOfTheLineAndGrowsAcrossIt) {
 
 TEST(EdgeField, LinesOfAnotherDirectionAreNotSeen) {
   EdgeField field(kSize);
-  std::vector<FrontEvent> events;
+  std::vector<FilteredEvent> events;
   for (int y = 20; y < 220; ++y) events.push_back(event_at(150, y));
   field.build(events);
   EXPECT_EQ(field.sample(150, 120, EdgeField::direction(1, 0)).distance, EdgeField::kReach_px);
@@ -52,7 +52,7 @@ TEST(EdgeField, DirectionOfALineHasNoSign) {
 
 TEST(EdgeField, LikelihoodRatioIsAboveOneOnALoneEdgeAndOneInTexture) {
   EdgeField field(kSize);
-  std::vector<FrontEvent> events;
+  std::vector<FilteredEvent> events;
   for (int y = 10; y < 230; ++y) {
     events.push_back(event_at(60, y));
     for (int x = 200; x < 310; x += 8) events.push_back(event_at(x, y));
@@ -88,8 +88,8 @@ class PoseSearchLaws : public ::testing::Test {
     for (std::size_t i = 0; i < lines_.size(); i += 6) points_.push_back(lines_[i]);
     field_.build(events(Pose{}));
   }
-  std::vector<FrontEvent> events(const Pose& T_map_cam) const {
-    std::vector<FrontEvent> out;
+  std::vector<FilteredEvent> events(const Pose& T_map_cam) const {
+    std::vector<FilteredEvent> out;
     for (const SearchPoint& p : lines_) {
       const auto u = camera_->project(T_map_cam.inverse() * p.position);
       if (u && kSize.contains(*u)) out.push_back(event_at(u->x(), u->y()));

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "evpose/core/pose.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 #include "evpose/registration/contour_view.h"
 
 namespace evpose {
@@ -31,7 +31,7 @@ enum class EventVerdict : std::uint8_t {
 
 /// What one measurement is made from.
 struct RegistrationProblem {
-  std::span<const FrontEvent> events;  ///< kept since the last update
+  std::span<const FilteredEvent> events;  ///< kept since the last update
   std::uint32_t now_us;                ///< time of the update, on the events' clock
   double span_s;                       ///< since the last update
   std::span<const ContourSample> samples;

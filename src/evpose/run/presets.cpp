@@ -19,8 +19,8 @@ constexpr std::array kPaper{
     Setting{"temporal_field.kernel", "bilinear"},
     Setting{"temporal_field.decay_min_s", "0.01"},
     Setting{"temporal_field.decay_max_s", "0.01"},
-    Setting{"events.filter.support_min_s", "0.01"},
-    Setting{"events.filter.support_max_s", "0.01"},
+    Setting{"events.noise_filter.support_min_s", "0.01"},
+    Setting{"events.noise_filter.support_max_s", "0.01"},
     Setting{"fusion.kind", "graph"},
 };
 

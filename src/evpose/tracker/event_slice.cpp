@@ -34,12 +34,12 @@ bool EventSlice::sparse() const { return events_.size() < kFewestEvents; }
 
 double EventSlice::mean_age_s(std::uint32_t now_us) const {
   double sum_s = 0;
-  for (const FrontEvent& e : events_) sum_s += 1e-6 * (now_us - e.stamp_us);
+  for (const FilteredEvent& e : events_) sum_s += 1e-6 * (now_us - e.stamp_us);
   return sum_s / static_cast<double>(std::max<std::size_t>(1, events_.size()));
 }
 
-void compensate_rotation(std::span<const FrontEvent> events, const Camera& camera,
-                         const SliceRotation& rotation, std::vector<FrontEvent>& out) {
+void compensate_rotation(std::span<const FilteredEvent> events, const Camera& camera,
+                         const SliceRotation& rotation, std::vector<FilteredEvent>& out) {
   const ImageSize size = camera.size();
   const int columns = size.width / kFlowCell_px + 1, rows = size.height / kFlowCell_px + 1;
   std::vector<Eigen::Vector2d> flow(static_cast<std::size_t>(columns * rows), Eigen::Vector2d::Zero());
@@ -51,7 +51,7 @@ void compensate_rotation(std::span<const FrontEvent> events, const Camera& camer
         flow[static_cast<std::size_t>(row * columns + column)] = -J * rotation.rate_cam.cross(*ray);
     }
   out.clear();
-  for (FrontEvent e : events) {
+  for (FilteredEvent e : events) {
     // By so much the instant is after the event.
     const double later_s = 1e-6 * (rotation.now_us - e.stamp_us) - rotation.age_s;
     const Eigen::Vector2d& f =

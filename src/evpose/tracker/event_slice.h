@@ -8,7 +8,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/core/time.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose {
 
@@ -20,7 +20,7 @@ class EventSlice {
 
   /// Leaves out what was collected; the slice begins at t.
   void restart(TimeNs t);
-  void add(std::span<const FrontEvent> events) {
+  void add(std::span<const FilteredEvent> events) {
     events_.insert(events_.end(), events.begin(), events.end());
   }
 
@@ -29,11 +29,11 @@ class EventSlice {
   /// So few events that nothing moves.
   bool sparse() const;
   double mean_age_s(std::uint32_t now_us) const;
-  std::span<const FrontEvent> events() const { return events_; }
+  std::span<const FilteredEvent> events() const { return events_; }
 
  private:
   int image_width_;
-  std::vector<FrontEvent> events_;
+  std::vector<FilteredEvent> events_;
   TimeNs begin_ = 0;
 };
 
@@ -46,7 +46,7 @@ struct SliceRotation {
 
 /// Replaces `out` by the events where they would be had the camera not turned between them and the instant;
 /// those that leave the image are left out.
-void compensate_rotation(std::span<const FrontEvent> events, const Camera& camera,
-                         const SliceRotation& rotation, std::vector<FrontEvent>& out);
+void compensate_rotation(std::span<const FilteredEvent> events, const Camera& camera,
+                         const SliceRotation& rotation, std::vector<FilteredEvent>& out);
 
 }  // namespace evpose

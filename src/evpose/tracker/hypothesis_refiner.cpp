@@ -49,7 +49,7 @@ HypothesisRefiner::HypothesisRefiner(const RelocalizerScene& scene, const Hypoth
     registrations_.emplace_back(camera_.size(), under_gate(scene.registration, gate_px), segments_.count);
 }
 
-void HypothesisRefiner::add_events(std::span<const FrontEvent> events, std::uint32_t now_us,
+void HypothesisRefiner::add_events(std::span<const FilteredEvent> events, std::uint32_t now_us,
                                    const ImuIncrement& motion, const Eigen::Vector3d& angular_rate) {
   if (intervals_.empty() || intervals_.back().motion.dt_s >= kInterval_s) {
     if (intervals_.size() == kIntervals) {

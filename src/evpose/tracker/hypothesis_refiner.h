@@ -38,7 +38,7 @@ class HypothesisRefiner {
   /// Leaves out the events of earlier searches.
   void clear_events() { intervals_.clear(); }
   /// Events up to `now_us`, how the body has moved since those before, and its present rate.
-  void add_events(std::span<const FrontEvent> events, std::uint32_t now_us, const ImuIncrement& motion,
+  void add_events(std::span<const FilteredEvent> events, std::uint32_t now_us, const ImuIncrement& motion,
                   const Eigen::Vector3d& angular_rate);
 
   /// Refines `h` and measures its concentration and support. `slices`: seen since the search began, which
@@ -51,7 +51,7 @@ class HypothesisRefiner {
 
   /// Some events one after another, up to now_us, and how the body moved meanwhile.
   struct Interval {
-    std::vector<FrontEvent> events;
+    std::vector<FilteredEvent> events;
     std::uint32_t now_us = 0;
     ImuIncrement motion;
     Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();

@@ -25,7 +25,7 @@ std::size_t InputQueue::feed(const EventPacket& packet, std::size_t from, TimeNs
   const auto end = std::upper_bound(begin, packet.events.end(), t,
                                     [&](TimeNs until, const Event& e) { return until < packet.time(e); });
   const double started_s = clock_ ? clock_() : 0;
-  front_.take(packet, {begin, end});
+  filter_.take(packet, {begin, end});
   if (clock_) feeding_s_ += clock_() - started_s;
   return static_cast<std::size_t>(end - packet.events.begin());
 }

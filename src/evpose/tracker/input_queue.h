@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "evpose/core/error.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose {
 
@@ -16,7 +16,7 @@ using StageClock = std::function<double()>;
 /// rest.
 class InputQueue {
  public:
-  InputQueue(EventFront& front, StageClock clock) : front_(front), clock_(std::move(clock)) {}
+  InputQueue(EventPreprocessor& filter, StageClock clock) : filter_(filter), clock_(std::move(clock)) {}
 
   /// Puts a packet at the end of the queue. It is borrowed until keep_rest().
   void offer(const EventPacket& packet);
@@ -36,7 +36,7 @@ class InputQueue {
   /// Feeds the part of one packet from `from` on that is not after t; returns where the rest begins.
   std::size_t feed(const EventPacket& packet, std::size_t from, TimeNs t);
 
-  EventFront& front_;
+  EventPreprocessor& filter_;
   StageClock clock_;
   std::deque<EventPacket> waiting_;
   std::size_t waiting_from_ = 0;  ///< the part of the first that has been fed

@@ -30,7 +30,7 @@ void describe(ConfigTable& table, RelocalizationConfig& config);
 struct RelocalizerInput {
   TimeNs t;
   std::uint32_t now_us;  ///< t on the events' clock
-  std::span<const FrontEvent> events;
+  std::span<const FilteredEvent> events;
   const ImuIncrement& motion;
   const Eigen::Vector3d& angular_rate;  ///< rad/s, body
   const Pose& T_body_cam;
@@ -76,7 +76,7 @@ class Relocalizer {
     EdgeField field;
     VisibleSet visible;  ///< points for the edges
     HypothesisRefiner refiner;
-    std::vector<FrontEvent> compensated;  ///< the slice's events, without rotation
+    std::vector<FilteredEvent> compensated;  ///< the slice's events, without rotation
     std::vector<SearchPoint> points;
   };
   double pause_s() const;

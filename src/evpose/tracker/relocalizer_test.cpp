@@ -164,10 +164,10 @@ class RelocalizerLaws : public ::testing::Test {
 
   static TimeNs time(double t_s) { return kStart_ns + from_seconds(t_s); }
   static std::uint32_t now_us(double t_s) { return static_cast<std::uint32_t>(std::lround(1e6 * (1 + t_s))); }
-  static std::vector<FrontEvent> front_events(double from_s, double to_s) {
-    std::vector<FrontEvent> out;
+  static std::vector<FilteredEvent> front_events(double from_s, double to_s) {
+    std::vector<FilteredEvent> out;
     for (const test_flight::TimedEvent& e : between(events_, from_s, to_s)) {
-      FrontEvent f{};
+      FilteredEvent f{};
       f.stamp_us = now_us(e.t_s);
       f.x = e.event.x;
       f.y = e.event.y;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 #include "evpose/registration/contour_view.h"
 
 namespace evpose {

@@ -13,7 +13,6 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/event/event.h"
-
 #include "evpose/imu/imu.h"
 #include "evpose/imu/strapdown.h"
 #include "evpose/map/contour_map.h"

@@ -91,8 +91,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       segments_(cut_into_segments(*setup_.map)),
       contours_(index_, segments_, *setup_.camera, T_body_cam_, visible_config(config),
                 config.event_registration.map_sigma_m, config.threads > 1),
-      front_(setup_.camera->size().width, setup_.camera->size().height, config.events),
-      input_(front_, clock),
+      preprocessor_(setup_.camera->size().width, setup_.camera->size().height, config.events),
+      input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
       registration_(make_registration(config, setup_.camera->size(), *setup_.map, segments_)),
       fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
@@ -166,16 +166,16 @@ Update Tracker::update(TimeNs t) {
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty());
   judge(t, span_s, stpe, refused);
-  front_.set_motion(contours_.typical_flow_px_s());
-  front_.forget();
-  return reporter_.finish(fusion_->state(), front_.counts());
+  preprocessor_.set_motion(contours_.typical_flow_px_s());
+  preprocessor_.clear_kept();
+  return reporter_.finish(fusion_->state(), preprocessor_.counts());
 }
 
 /// When the pose is found, tracking begins there.
 void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   const FusionState& state = fusion_->state();
   const auto found = supervisor_.search(
-      {t, front_.stamp(t), front_.kept(), moved, state.angular_rate, T_body_cam_}, *fusion_);
+      {t, preprocessor_.stamp(t), preprocessor_.kept(), moved, state.angular_rate, T_body_cam_}, *fusion_);
   if (!found) return;
   fusion_->start(*found);
   registration_->restart();
@@ -184,14 +184,14 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
 
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   const Matrix6d covariance = fusion_->measured_covariance();
-  RegistrationProblem problem{front_.kept(), front_.stamp(t), span_s, contours_.samples(), covariance};
-  problem.surface = front_.surface();
+  RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(), covariance};
+  problem.surface = preprocessor_.surface();
   problem.view = &contours_.view();
   problem.T_map_body = fusion_->state().nav.T_map_body;
   if (verdict_callback_) problem.verdicts = &verdicts_;
   const RegistrationResult result = registration_->measure(problem);
-  if (verdict_callback_ && verdicts_.size() == front_.kept().size())
-    verdict_callback_(front_.kept(), verdicts_);
+  if (verdict_callback_ && verdicts_.size() == preprocessor_.kept().size())
+    verdict_callback_(preprocessor_.kept(), verdicts_);
   return result;
 }
 
@@ -224,7 +224,7 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
 /// What is wrong with the data, in words; empty if nothing is.
 std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) const {
   if (std::string imu = imu_.fault(t); !imu.empty()) return imu;
-  if (reporter_.most_events_shed(front_.counts())) return "more events than are taken (events.most_mev_s)";
+  if (reporter_.most_events_shed(preprocessor_.counts())) return "more events than are taken (events.most_mev_s)";
   if (!measurement.consistent) return "events do not gather at the contours";
   return imu_.contradicts(t) ? "IMU contradicts the camera" : "";
 }
@@ -242,8 +242,8 @@ Snapshot Tracker::snapshot(double decay_s) const {
   Snapshot out;
   out.size = setup_.camera->size();
   const auto pixels = static_cast<std::size_t>(out.size.width) * static_cast<std::size_t>(out.size.height);
-  out.decay = front_.surface() != nullptr
-                  ? decayed(*front_.surface(), front_.stamp(fusion_->state().t), decay_s)
+  out.decay = preprocessor_.surface() != nullptr
+                  ? decayed(*preprocessor_.surface(), preprocessor_.stamp(fusion_->state().t), decay_s)
                   : std::vector<float>(pixels);
   out.points = chosen_points(decay_s);
   return out;
@@ -251,8 +251,8 @@ Snapshot Tracker::snapshot(double decay_s) const {
 
 std::vector<Snapshot::Point> Tracker::chosen_points(double decay_s) const {
   const FusionState& state = fusion_->state();
-  return project_points(contours_.view(), contours_.points(), state.nav.T_map_body, front_.surface(),
-                        front_.stamp(state.t), decay_s);
+  return project_points(contours_.view(), contours_.points(), state.nav.T_map_body, preprocessor_.surface(),
+                        preprocessor_.stamp(state.t), decay_s);
 }
 
 }  // namespace evpose

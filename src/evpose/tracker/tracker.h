@@ -54,7 +54,7 @@ class Tracker {
   void on_state(ImuRateOutput::Callback callback) { imu_rate_output_.set_callback(std::move(callback)); }
   /// Called within each update with the events since the last one that passed the filter and what the
   /// registration made of them (registration.kind: events).
-  using VerdictCallback = std::function<void(std::span<const FrontEvent>, std::span<const EventVerdict>)>;
+  using VerdictCallback = std::function<void(std::span<const FilteredEvent>, std::span<const EventVerdict>)>;
   void on_verdicts(VerdictCallback callback) { verdict_callback_ = std::move(callback); }
 
   /// In order of time. An update is made as soon as both streams have passed its time.
@@ -66,9 +66,9 @@ class Tracker {
   /// After the next update only every n-th is made: for a driver that cannot keep up. 1: all.
   void set_update_stride(int n) { update_stride_ = n; }
   /// From now on a time surface is kept for snapshots, or no longer.
-  void keep_time_surface(bool on) { front_.keep_surface(on || registration_->reads_surface()); }
+  void keep_time_surface(bool on) { preprocessor_.keep_surface(on || registration_->reads_surface()); }
 
-  const EventFront& events() const { return front_; }
+  const EventPreprocessor& events() const { return preprocessor_; }
   /// What the fusion found to be wrong with the given calibration, if it was asked to look.
   Calibration calibration() const { return fusion_->calibration(); }
   /// The map with the signs of contrast that events have told so far; the others are the map's.
@@ -100,7 +100,7 @@ class Tracker {
   ContourIndex index_;
   ContourSegments segments_;  ///< of the map, for the contrast
   ContourSelection contours_;
-  EventFront front_;
+  EventPreprocessor preprocessor_;
   InputQueue input_;
   ImuGate imu_;
   std::unique_ptr<Registration> registration_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 #include "evpose/fusion/back_end.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/event_registration.h"
@@ -17,7 +17,7 @@ namespace evpose {
 struct TrackerConfig {
   double rate_hz = 300;
   int threads = 1;
-  EventFrontConfig events;
+  EventPreprocessorConfig events;
   VisibleSetConfig visible;
   RegistrationKind registration = RegistrationKind::events;
   EventRegistrationConfig event_registration;

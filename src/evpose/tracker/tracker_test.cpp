@@ -12,6 +12,9 @@
 #include <numbers>
 #include <random>
 
+#include "evpose/core/config.h"
+#include "evpose/tracker/test_flight.h"
+
 namespace {
 std::atomic<std::int64_t> allocations{0};
 }  // namespace
@@ -37,56 +40,11 @@ void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::fre
 namespace evpose {
 namespace {
 
-constexpr double kSpacing_m = 0.02;
-constexpr TimeNs kStart_ns = kNsPerMs;
-
-/// The camera's motion: smooth, with enough of each of its six components.
-Pose pose_at(double t) {
-  return {
-      so3::exp(Eigen::Vector3d(0.06 * std::sin(1.7 * t), 0.10 * std::sin(2.1 * t + 0.5),
-                               0.08 * std::sin(1.3 * t))),
-      {0.8 + 0.20 * std::sin(1.9 * t), 3 + 0.25 * std::sin(1.5 * t + 0.4), 1.5 + 0.12 * std::sin(2.3 * t)}};
-}
-
-/// Camera axes in the body's: z along the body's x.
-Pose camera_on_body() {
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Eigen::Quaterniond(R), {0.03, 0.01, -0.02}};
-}
-
-void add_edge(ContourMap& map, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  const Eigen::Vector3d t = (b - a).normalized();
-  const auto contour = map.points.empty() ? 0 : map.points.back().contour + 1;
-  for (double s = 0; s < (b - a).norm(); s += kSpacing_m) {
-    ContourPoint p;
-    p.position = (a + s * t).cast<float>();
-    p.tangent = t.cast<float>();
-    p.normal = t.unitOrthogonal().cast<float>();
-    p.length = static_cast<float>(kSpacing_m);
-    p.contour = contour;
-    map.points.push_back(p);
-  }
-}
-
-ContourMap boxes() {
-  ContourMap map;
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> u(0, 1);
-  for (int i = 0; i < 14; ++i) {
-    const Eigen::Vector3d low(3 + 2 * u(random), 1 + 3.4 * u(random), 0.2 + 2 * u(random));
-    const Eigen::Vector3d high =
-        low + Eigen::Vector3d(0.2 + 0.5 * u(random), 0.2 + 0.6 * u(random), 0.2 + 0.6 * u(random));
-    const auto corner = [&](int k) {
-      return Eigen::Vector3d((k & 1) ? high.x() : low.x(), (k & 2) ? high.y() : low.y(),
-                             (k & 4) ? high.z() : low.z());
-    };
-    for (int k = 0; k < 8; ++k)
-      for (const int bit : {1, 2, 4})
-        if (!(k & bit)) add_edge(map, corner(k), corner(k | bit));
-  }
-  return map;
-}
+using test_flight::add_edge;
+using test_flight::boxes;
+using test_flight::camera_on_body;
+using test_flight::kStart_ns;
+using test_flight::pose_at;
 
 /// Some parallel lines far longer than the view.
 ContourMap parallel_lines() {
@@ -99,8 +57,7 @@ ContourMap parallel_lines() {
 class BadInput : public ::testing::Test {
  protected:
   BadInput() {
-    setup_.camera =
-        std::move(make_camera({300, 300, 159.5, 119.5, "radtan", {-0.05, 0.01, 0, 0}, {320, 240}})).value();
+    setup_.camera = test_flight::make_flight_camera();
     setup_.T_body_cam = camera_on_body();
     setup_.imu_noise.rate_hz = 1000;
   }
@@ -112,54 +69,23 @@ class BadInput : public ::testing::Test {
     StartState start;
     start.t = kStart_ns;
     start.T_map_body = pose_at(0);
-    constexpr double h = 1e-4;
-    start.velocity = (pose_at(h).p - pose_at(-h).p) / (2 * h);
+    start.velocity = test_flight::velocity_at(0);
     tracker_ = std::move(Tracker::create(setup_, config_, start)).value();
     tracker_->on_update([this](const Update& u) {
       updates_.push_back(u);
       if (!u.reason.empty()) reasons_.push_back(std::string(to_string(u.health)) + ": " + u.reason);
     });
     updates_.reserve(10000);
-    std::vector<std::optional<Eigen::Vector2d>> before(world.points.size());
     constexpr int kStepsPerPacket = 4;
-    constexpr double kStep_s = 2.5e-4;
-    std::vector<std::pair<double, Event>> events;
+    constexpr double kStep_s = test_flight::EdgeEvents::kStep_s;
+    test_flight::EdgeEvents edges(world, camera);
+    std::vector<test_flight::TimedEvent> events;
     for (int i = 0; kStep_s * i < seconds; ++i) {
       const double t = kStep_s * i;
-      const Pose T_cam_map = (pose_at(t) * camera_on_body()).inverse();
-      const bool silent = t >= silent_from && t < silent_to;
-      for (std::size_t k = 0; k < world.points.size(); ++k) {
-        const Eigen::Vector3d x = T_cam_map * world.position(k);
-        Matrix23d J;
-        auto pixel = x.z() > 0.3 ? camera.project(x, &J) : std::nullopt;
-        if (pixel && !camera.size().contains(*pixel)) pixel.reset();
-        if (pixel && before[k] && !silent) {
-          // An event when the edge reaches the middle of a pixel, along the axis that it runs across.
-          const Eigen::Vector2d along = J * (T_cam_map.q * world.points[k].tangent.cast<double>());
-          const int axis = std::abs(along.x()) > std::abs(along.y()) ? 1 : 0;
-          const double a = (*before[k])[axis], b = (*pixel)[axis];
-          if (std::floor(a) != std::floor(b)) {
-            const double line = std::max(std::floor(a), std::floor(b)), share = (line - a) / (b - a);
-            const Eigen::Vector2d at = *before[k] + share * (*pixel - *before[k]);
-            const bool rising = b > a;
-            events.emplace_back(
-                t - kStep_s + share * kStep_s,
-                make_event(0, static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())),
-                           rising == (world.points[k].contour % 2 == 0)));
-          }
-        }
-        before[k] = pixel;
-      }
+      edges.advance(t, t >= silent_from && t < silent_to, events);
       if ((i + 1) % kStepsPerPacket != 0) continue;
-      tracker_->add_imu(imu_at(t));
-      std::sort(events.begin(), events.end(), [](const auto& p, const auto& q) { return p.first < q.first; });
-      EventPacket packet;
-      packet.base = kStart_ns + from_seconds(t - kStepsPerPacket * kStep_s);
-      for (const auto& [when, event] : events) {
-        packet.events.push_back(event);
-        packet.events.back().dt_us = static_cast<std::uint32_t>(
-            std::max<TimeNs>(0, (kStart_ns + from_seconds(when) - packet.base) / kNsPerUs));
-      }
+      tracker_->add_imu(test_flight::imu_at(t));
+      const EventPacket packet = test_flight::make_packet(events, t - kStepsPerPacket * kStep_s);
       events.clear();
       const std::int64_t already = allocations;
       const std::size_t done = updates_.size();
@@ -169,13 +95,6 @@ class BadInput : public ::testing::Test {
     }
   }
 
-  static ImuSample imu_at(double t) {
-    constexpr double h = 1e-4;
-    const Pose a = pose_at(t - h), b = pose_at(t), c = pose_at(t + h);
-    const Eigen::Vector3d acceleration = (a.p - 2 * b.p + c.p) / (h * h);
-    return {kStart_ns + from_seconds(t), so3::log(a.q.conjugate() * c.q) / (2 * h),
-            b.q.conjugate() * (acceleration + Eigen::Vector3d(0, 0, 9.81))};
-  }
   static double error_m(const Update& u) {
     return (u.T_map_body.p - pose_at(to_seconds(u.t - kStart_ns)).p).norm();
   }
@@ -201,6 +120,13 @@ class BadInput : public ::testing::Test {
   std::vector<std::string> reasons_;
   std::vector<std::int64_t> allocated_;  ///< per update
 };
+
+TEST(TrackerConfig, HasNoMoreThanFiftySettings) {
+  TrackerConfig config;
+  ConfigTable table;
+  describe(table, config);
+  EXPECT_LE(table.values().size(), 50U);
+}
 
 TEST_F(BadInput, GoodInputIsTrackedAndAllocatesNextToNothing) {
   setup_.map = std::make_shared<const ContourMap>(boxes());

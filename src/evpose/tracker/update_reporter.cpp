@@ -34,7 +34,7 @@ void UpdateReporter::add_judgement(Health health, std::string reason, const Matr
   update_.covariance = covariance;
 }
 
-Update UpdateReporter::finish(const FusionState& state, const EventFront::Counts& counts) {
+Update UpdateReporter::finish(const FusionState& state, const EventPreprocessor::Counts& counts) {
   update_.t = state.t;
   update_.T_map_body = state.nav.T_map_body;
   update_.velocity = state.nav.velocity;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 #include "evpose/fusion/state.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/input_queue.h"
@@ -23,17 +23,17 @@ class UpdateReporter {
   /// The pose's covariance as it was judged.
   void add_judgement(Health health, std::string reason, const Matrix6d& covariance);
   /// The state at the end of the update, and the counts of events until now.
-  Update finish(const FusionState& state, const EventFront::Counts& counts);
+  Update finish(const FusionState& state, const EventPreprocessor::Counts& counts);
 
   /// Of the events since the last update, most were left out because too many came.
-  bool most_events_shed(const EventFront::Counts& counts) const {
+  bool most_events_shed(const EventPreprocessor::Counts& counts) const {
     return 2 * (counts.shed - counted_.shed) > counts.read - counted_.read;
   }
 
  private:
   StageClock clock_;
   double stage_began_s_ = 0;
-  EventFront::Counts counted_;  ///< at the last update
+  EventPreprocessor::Counts counted_;  ///< at the last update
   Update update_;
 };
 

@@ -67,12 +67,12 @@ Tally tally(const Streams& streams, const std::vector<std::uint8_t>& origins, do
   auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start);
   if (!tracker) return out;
   EventCursor cursor(streams.packets);
-  const auto at_cursor = [&](const FrontEvent& event) {
+  const auto at_cursor = [&](const FilteredEvent& event) {
     const Event& e = cursor.event();
     return e.x == event.x && e.y == event.y && e.on == event.on &&
            (*tracker)->events().stamp(cursor.packet().time(e)) == event.stamp_us;
   };
-  (*tracker)->on_verdicts([&](std::span<const FrontEvent> events, std::span<const EventVerdict> verdicts) {
+  (*tracker)->on_verdicts([&](std::span<const FilteredEvent> events, std::span<const EventVerdict> verdicts) {
     for (std::size_t k = 0; k < events.size(); ++k) {
       while (!cursor.ended() && !at_cursor(events[k])) cursor.next();
       if (cursor.ended()) return;

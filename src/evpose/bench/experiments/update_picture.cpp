@@ -25,7 +25,7 @@ constexpr std::array<Kind, 6> kKinds{{{EventVerdict::elsewhere, "#c9ccd1", "near
                                       {EventVerdict::predicted, "#1f77d0", "used, polarity as predicted"}}};
 
 struct Drawn {
-  std::vector<FrontEvent> events;
+  std::vector<FilteredEvent> events;
   std::vector<EventVerdict> verdicts;
   std::vector<Snapshot::Point> points;
 };
@@ -36,7 +36,7 @@ std::optional<Drawn> update_at(const Streams& streams, double at_s) {
   if (!tracker) return std::nullopt;
   Drawn newest;
   std::optional<Drawn> out;
-  (*tracker)->on_verdicts([&](std::span<const FrontEvent> events, std::span<const EventVerdict> verdicts) {
+  (*tracker)->on_verdicts([&](std::span<const FilteredEvent> events, std::span<const EventVerdict> verdicts) {
     newest.events.assign(events.begin(), events.end());
     newest.verdicts.assign(verdicts.begin(), verdicts.end());
   });

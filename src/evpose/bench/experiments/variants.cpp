@@ -13,7 +13,7 @@ namespace evpose::experiments {
 namespace {
 
 const std::vector<Variant> kBackEnds{
-    {"STPE alone", false, {"events.filter.on=false", "registration.polarity=false"}},
+    {"STPE alone", false, {"events.noise_filter.on=false", "registration.polarity=false"}},
     {"STPE with filter and polarity", false, {}},
     {"particle filter", true, {"fusion.kind=particle"}},
     {"EKF (full, the default)", true, {"fusion.kind=ekf"}},
@@ -24,7 +24,7 @@ const std::vector<Variant> kBackEnds{
 
 const std::vector<Variant> kAblation{
     {"all", true, {}},
-    {"without noise filter", true, {"events.filter.on=false"}},
+    {"without noise filter", true, {"events.noise_filter.on=false"}},
     {"without polarity", true, {"registration.polarity=false"}},
     {"polarity without buffer zone", true, {"registration.buffer_sigma=0"}},
     {"with extraction of moving things", true, {"registration.ego_motion_test=true"}},
@@ -35,7 +35,7 @@ const std::vector<Variant> kAblation{
     {"temporal field without IMU (STPE)", false, {"registration.kind=temporal_field"}},
     {"temporal field without IMU and noise filter",
      false,
-     {"registration.kind=temporal_field", "events.filter.on=false"}},
+     {"registration.kind=temporal_field", "events.noise_filter.on=false"}},
 };
 
 struct Figures {

@@ -14,14 +14,14 @@ namespace evpose {
 
 class ConfigTable;
 
-struct EventFrontConfig {
-  NoiseFilterConfig filter;
+struct EventPreprocessorConfig {
+  NoiseFilterConfig noise;
   double most_mev_s = 100;  ///< events are shed beyond this rate, spread evenly; 0: never
 };
-void describe(ConfigTable& table, EventFrontConfig& config);
+void describe(ConfigTable& table, EventPreprocessorConfig& config);
 
 /// An event that passed the filter, in microseconds of the stamps' clock.
-struct FrontEvent {
+struct FilteredEvent {
   std::uint32_t stamp_us;
   std::uint16_t x;
   std::uint16_t y : 15;
@@ -29,9 +29,9 @@ struct FrontEvent {
 };
 
 /// The way of every event: rate limit and noise filter, in one pass; then, if asked for, the time surface.
-class EventFront {
+class EventPreprocessor {
  public:
-  EventFront(int width, int height, const EventFrontConfig& config);
+  EventPreprocessor(int width, int height, const EventPreprocessorConfig& config);
 
   /// Takes events of `packet` (a part of it, in order). Events outside the image are counted and left out.
   void take(const EventPacket& packet, std::span<const Event> events);
@@ -39,9 +39,9 @@ class EventFront {
   /// Predicted image motion from here on, px/s (a typical one; <= 0: unknown).
   void set_motion(double flow_px_per_s);
 
-  /// Kept since the last call of forget(), in order of time.
-  std::span<const FrontEvent> kept() const { return kept_; }
-  void forget() { kept_.clear(); }
+  /// Kept since the last call of clear_kept(), in order of time.
+  std::span<const FilteredEvent> kept() const { return kept_; }
+  void clear_kept() { kept_.clear(); }
 
   /// From now on every event that is kept is drawn into the time surface, or no longer. The surface begins
   /// empty.
@@ -50,7 +50,7 @@ class EventFront {
   const TimeSurface* surface() const { return surface_ ? &*surface_ : nullptr; }
   /// Stamp of a time on the events' clock, which the surface shares.
   std::uint32_t stamp(TimeNs t) const { return clock_.at(t); }
-  const NoiseFilter& filter() const { return filter_; }
+  const NoiseFilter& noise_filter() const { return noise_filter_; }
 
   struct Counts {
     std::int64_t read = 0, kept = 0, outside = 0, shed = 0;
@@ -61,14 +61,14 @@ class EventFront {
   void rebase(std::uint32_t shift_us);
   bool shed(const Event& event, std::uint32_t stamp_us);
 
-  EventFrontConfig config_;
+  EventPreprocessorConfig config_;
   int width_, height_;
   StampClock clock_;
-  NoiseFilter filter_;
+  NoiseFilter noise_filter_;
   std::optional<TimeSurface> surface_;
   double allowance_ = 0;  ///< events that may come at once now; refilled at the rate's limit
   std::uint32_t refilled_us_ = 0;
-  std::vector<FrontEvent> kept_;
+  std::vector<FilteredEvent> kept_;
   Counts counts_;
 };
 

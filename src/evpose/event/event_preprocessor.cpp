@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 #include <algorithm>
 
@@ -11,35 +11,35 @@ constexpr double kAllowed_us = 5000;  // of the limit's rate may come at once
 constexpr std::size_t kAhead = 16;    // events; as long as memory takes to answer
 }  // namespace
 
-void describe(ConfigTable& table, EventFrontConfig& c) {
-  table.group("filter", c.filter);
+void describe(ConfigTable& table, EventPreprocessorConfig& c) {
+  table.group("noise_filter", c.noise);
   table.add("most_mev_s", c.most_mev_s, "Mev/s", "events are shed beyond this rate; 0: never", {0, 1e5});
 }
 
-EventFront::EventFront(int width, int height, const EventFrontConfig& config)
-    : config_(config), width_(width), height_(height), filter_(width, height, config.filter) {}
+EventPreprocessor::EventPreprocessor(int width, int height, const EventPreprocessorConfig& config)
+    : config_(config), width_(width), height_(height), noise_filter_(width, height, config.noise) {}
 
-void EventFront::set_motion(double flow_px_per_s) { filter_.set_motion(flow_px_per_s); }
+void EventPreprocessor::set_motion(double flow_px_per_s) { noise_filter_.set_motion(flow_px_per_s); }
 
-void EventFront::keep_surface(bool on) {
+void EventPreprocessor::keep_surface(bool on) {
   if (!on) return surface_.reset();
   if (!surface_) surface_.emplace(width_, height_);
 }
 
-void EventFront::rebase(std::uint32_t shift_us) {
-  filter_.rebase(shift_us);
+void EventPreprocessor::rebase(std::uint32_t shift_us) {
+  noise_filter_.rebase(shift_us);
   if (surface_) surface_->rebase(shift_us);
   refilled_us_ = refilled_us_ > shift_us ? refilled_us_ - shift_us : 0;
-  for (FrontEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
+  for (FilteredEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
 
-void EventFront::take(const EventPacket& packet, std::span<const Event> events) {
+void EventPreprocessor::take(const EventPacket& packet, std::span<const Event> events) {
   if (events.empty()) return;
   std::int64_t base_us = clock_.microseconds(packet.time(events.front())) - events.front().dt_us;
   for (std::size_t i = 0; i < events.size(); ++i) {
     if (i + kAhead < events.size()) {
       const Event& later = events[i + kAhead];
-      if (later.x < width_ && later.y < height_) filter_.prefetch(later.x, later.y);
+      if (later.x < width_ && later.y < height_) noise_filter_.prefetch(later.x, later.y);
     }
     const Event& e = events[i];
     ++counts_.read;
@@ -56,7 +56,7 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
       ++counts_.shed;
       continue;
     }
-    if (!filter_.keep(e.x, e.y, stamp)) continue;
+    if (!noise_filter_.keep(e.x, e.y, stamp)) continue;
     ++counts_.kept;
     kept_.push_back({stamp, e.x, e.y, e.on});
     if (surface_) surface_->insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, stamp);
@@ -65,7 +65,7 @@ void EventFront::take(const EventPacket& packet, std::span<const Event> events) 
 
 /// The fuller the last milliseconds were, the fewer events pass: which of them is by chance, so that no part
 /// of the image or of a burst is preferred, but always the same for the same event.
-bool EventFront::shed(const Event& e, std::uint32_t stamp_us) {
+bool EventPreprocessor::shed(const Event& e, std::uint32_t stamp_us) {
   const double full = kAllowed_us * config_.most_mev_s;
   if (refilled_us_ == 0) allowance_ = full;
   if (stamp_us > refilled_us_) {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "evpose/bench/micro/scene.h"
-#include "evpose/event/event_front.h"
+#include "evpose/event/event_preprocessor.h"
 
 namespace evpose::bench {
 namespace {
@@ -17,11 +17,11 @@ void front(benchmark::State& state) {
   const double rate = 1e6 * static_cast<double>(state.range(2));
   const Scene scene = make_scene(width, height);
   EventPacket packet = make_events(scene, static_cast<std::size_t>(rate * kSpan_s), kSpan_s);
-  EventFront front(width, height, {});
+  EventPreprocessor front(width, height, {});
   front.set_motion(200);
   for (auto _ : state) {
     front.take(packet, packet.events);
-    front.forget();
+    front.clear_kept();
     packet.base += from_seconds(kSpan_s);
   }
   state.counters["Mev/s"] = benchmark::Counter(

@@ -23,11 +23,12 @@ struct VisibleSetConfig {
   bool occlusion = true;  ///< leave out points behind the map's occluders, if it has any
 
   // Not for users: the relocalizer and tests differ in these. Lengths hold for an image 640 wide.
-  double near_m = 0.1;        ///< points nearer are left out: no camera is sharp there
-  double margin_px = 20;      ///< points may lie this far outside of the image when chosen
-  double refresh_px = 16;     ///< chosen again before the view has moved by this much: less than the margin
-  int updates = 6;            ///< that a choice takes, fewer in fast motion
-  double grazing_sin = 0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
+  double near_m = 0.1;     ///< points nearer are left out: no camera is sharp there
+  double margin_px = 20;   ///< points may lie this far outside of the image when chosen
+  double refresh_px = 16;  ///< chosen again before the view has moved by this much: less than the margin
+  int updates = 6;         ///< that a choice takes, fewer in fast motion
+  double grazing_sin =
+      0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
 };
 void describe(ConfigTable& table, VisibleSetConfig& config);
 

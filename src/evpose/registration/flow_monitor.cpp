@@ -19,8 +19,8 @@ constexpr double kMistrust_s = 0.1;   // decay time of mistrust
 
 }  // namespace
 
-FlowMonitor::Answer FlowMonitor::compare(const TimeSurface& surface, const FilteredEvent& e, float nx, float ny,
-                                         float speed_px_s) {
+FlowMonitor::Answer FlowMonitor::compare(const TimeSurface& surface, const FilteredEvent& e, float nx,
+                                         float ny, float speed_px_s) {
   if (std::abs(speed_px_s) < kFrom_px_s) return Answer::unknown;
   const float back = speed_px_s > 0 ? -kBehind_px : kBehind_px;
   const int bx = static_cast<int>(std::lround(back * nx)), by = static_cast<int>(std::lround(back * ny));

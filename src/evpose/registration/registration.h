@@ -32,8 +32,8 @@ enum class EventVerdict : std::uint8_t {
 /// What one measurement is made from.
 struct RegistrationProblem {
   std::span<const FilteredEvent> events;  ///< kept since the last update
-  std::uint32_t now_us;                ///< time of the update, on the events' clock
-  double span_s;                       ///< since the last update
+  std::uint32_t now_us;                   ///< time of the update, on the events' clock
+  double span_s;                          ///< since the last update
   std::span<const ContourSample> samples;
   const Matrix6d& pose_covariance;                ///< of the prediction
   const TimeSurface* surface = nullptr;           ///< with these events; null unless reads_surface()

@@ -214,7 +214,8 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
   summary.events_read = static_cast<std::uint64_t>(counts.read);
   summary.events_kept = static_cast<std::uint64_t>(counts.kept);
   summary.events_shed = static_cast<std::uint64_t>(counts.shed);
-  for (const auto& p : tracker.events().noise_filter().hot_pixels()) summary.hot_pixels.emplace_back(p.x, p.y);
+  for (const auto& p : tracker.events().noise_filter().hot_pixels())
+    summary.hot_pixels.emplace_back(p.x, p.y);
   summary.versions = {
       {"compiler", __VERSION__},
       {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};

@@ -247,7 +247,7 @@ class AgreementLaws : public ::testing::Test {
   static Eigen::Vector3d push(double s) { return {2 * std::sin(6 * s), std::cos(4 * s), std::sin(7 * s)}; }
   /// Greatest difference in standard deviations, and the time at which the IMU was first distrusted, s.
   void run(double late_s, double scale, const Eigen::Vector3d& bias, bool absorb) {
-    ImuAgreement agreement{ImuAgreementConfig{}};
+    ImuAgreement agreement;
     const Eigen::Vector3d gravity(0, 0, -9.81);
     const ImuNoise noise{.accel_density = 3e-3, .gyro_density = 6e-4};
     Eigen::Vector3d velocity(1, -2, 0.5);

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evpose/core/config.h"
-
 namespace evpose {
 
 namespace {
@@ -14,14 +12,10 @@ constexpr double kTurns_s = 0.06;   // turns of gyroscope and estimate are compa
 constexpr double kForces_s = 0.25;  // bends of the path by IMU and estimate are compared over so long
 // While the IMU's stamps are doubted, a smaller difference is a contradiction, by this factor.
 constexpr double kDoubtedShare = 0.6;
-constexpr double kDistrust_s = 1.0;  // so long after a contradiction the IMU is not relied on
+constexpr double kContradictionSigma = 2.5;  // a difference of so many standard deviations is a contradiction
+constexpr double kDistrust_s = 1.0;          // so long after a contradiction the IMU is not relied on
 
 }  // namespace
-
-void describe(ConfigTable& table, ImuAgreementConfig& c) {
-  table.add("contradiction_sigma", c.contradiction_sigma, "",
-            "IMU and camera contradict each other at so many standard deviations", {1, 1e9});
-}
 
 void ImuAgreement::add_step(const ImuSample& a, const ImuSample& b, const FusionState& from,
                             const Eigen::Vector3d& gravity_map, const ImuNoise& noise) {
@@ -93,7 +87,7 @@ double ImuAgreement::judge(const FusionState& state, bool doubted) {
   const Moment *turned = before(kTurns_s), *middle = before(0.5 * kForces_s), *begin = before(kForces_s);
   const double sigmas = std::max(turned != nullptr ? turn_difference(*turned) : 0,
                                  begin != nullptr ? bend_difference(*begin, *middle) : 0);
-  if (!(sigmas <= config_.contradiction_sigma * (doubted ? kDoubtedShare : 1)))
+  if (!(sigmas <= kContradictionSigma * (doubted ? kDoubtedShare : 1)))
     distrust_until_ = state.t + from_seconds(kDistrust_s);
   const TimeNs since = state.t - from_seconds(std::max(kTurns_s, kForces_s));
   while (first_ + 1 < past_.size() && past_[first_ + 1].t <= since) ++first_;

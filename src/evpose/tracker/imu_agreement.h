@@ -9,21 +9,12 @@
 
 namespace evpose {
 
-class ConfigTable;
-
-struct ImuAgreementConfig {
-  double contradiction_sigma = 2.5;  ///< a difference of so many standard deviations is a contradiction
-};
-void describe(ConfigTable& table, ImuAgreementConfig& config);
-
 /// Holds the IMU against the camera: turn and bend of the path over a short while as the one integrates them
 /// and as the estimate, led by the contours, has them. A clock that has jumped, an axis of a wrong scale or
 /// sign, or a reading that is frozen shows as a difference that neither noise nor bias explains.
 /// The bend is p(t) - 2 p(t - T) + p(t - 2 T): it needs no velocity, which contours alone tell badly.
 class ImuAgreement {
  public:
-  explicit ImuAgreement(const ImuAgreementConfig& config) : config_(config) {}
-
   /// The estimate comes from elsewhere: what was before does not count.
   void restart() { past_.clear(), first_ = 0; }
   /// A step of the IMU from the estimate's time on, with the densities of its noise.
@@ -57,7 +48,6 @@ class ImuAgreement {
   double turn_difference(const Moment& then) const;
   double bend_difference(const Moment& begin, const Moment& middle) const;
 
-  ImuAgreementConfig config_;
   Moment now_;
   std::vector<Moment> past_;  ///< at the updates, in order of time
   std::size_t first_ = 0;     ///< of past_ that is still needed

@@ -3,14 +3,7 @@
 
 #include <algorithm>
 
-#include "evpose/core/config.h"
-
 namespace evpose {
-
-void describe(ConfigTable& table, ImuGateConfig& c) {
-  describe(table, c.watch);
-  describe(table, c.agreement);
-}
 
 std::span<const CheckedImu> ImuGate::add(const ImuSample& sample, TimeNs state_t) {
   if (model_ != MotionModel::imu) return {};

@@ -12,12 +12,6 @@
 
 namespace evpose {
 
-struct ImuGateConfig {
-  ImuWatchConfig watch;
-  ImuAgreementConfig agreement;
-};
-void describe(ConfigTable& table, ImuGateConfig& config);
-
 /// Everything between the IMU's samples and the prediction: which of them are used, how far each is trusted,
 /// and what stands in where the IMU is silent or contradicts the camera. Without an IMU it predicts by
 /// constant velocity.
@@ -26,8 +20,7 @@ class ImuGate {
   /// An IMU that is silent for longer is not waited for.
   static constexpr TimeNs kPatience = 50 * kNsPerMs;
 
-  ImuGate(const ImuGateConfig& config, MotionModel model)
-      : model_(model), watch_(config.watch), agreement_(config.agreement) {}
+  ImuGate(const ImuWatchConfig& config, MotionModel model) : model_(model), watch_(config) {}
 
   /// Checks a sample. The samples that may be used now, in order of time; valid until the next call.
   std::span<const CheckedImu> add(const ImuSample& sample, TimeNs state_t);

@@ -184,7 +184,8 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
 
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   const Matrix6d covariance = fusion_->measured_covariance();
-  RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(), covariance};
+  RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(),
+                              covariance};
   problem.surface = preprocessor_.surface();
   problem.view = &contours_.view();
   problem.T_map_body = fusion_->state().nav.T_map_body;
@@ -224,7 +225,8 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
 /// What is wrong with the data, in words; empty if nothing is.
 std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) const {
   if (std::string imu = imu_.fault(t); !imu.empty()) return imu;
-  if (reporter_.most_events_shed(preprocessor_.counts())) return "more events than are taken (events.most_mev_s)";
+  if (reporter_.most_events_shed(preprocessor_.counts()))
+    return "more events than are taken (events.most_mev_s)";
   if (!measurement.consistent) return "events do not gather at the contours";
   return imu_.contradicts(t) ? "IMU contradicts the camera" : "";
 }

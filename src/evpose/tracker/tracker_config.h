@@ -23,7 +23,7 @@ struct TrackerConfig {
   EventRegistrationConfig event_registration;
   TemporalFieldConfig temporal_field;
   FusionConfig fusion;
-  ImuGateConfig imu;
+  ImuWatchConfig imu;
   RelocalizationConfig relocalization;
   HealthConfig health;
 };

@@ -221,7 +221,8 @@ TEST_F(BadInput, WhereContoursStandOffIsLearntFromTheirEvents) {
       if (to_seconds(u.t - kStart_ns) > 0.2) sum += error_m(u), ++count;
     return sum / count;
   };
-  const double learnt = mean_error_m(SegmentOffsetUse::automatic), plain = mean_error_m(SegmentOffsetUse::off);
+  const double learnt = mean_error_m(SegmentOffsetUse::automatic),
+               plain = mean_error_m(SegmentOffsetUse::off);
   EXPECT_LT(learnt, 0.6 * plain) << plain;
 }
 

@@ -10,7 +10,7 @@ import sys
 import harness
 import tables
 
-PAPER = ["--set", "registration.kind=temporal_field"]
+FIELD = ["--set", "registration.kind=temporal_field"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,21 +22,22 @@ class Variant:
 
 
 def everywhere(decay_s):
-    return (*PAPER, "--set", f"temporal_field.decay_min_s={decay_s}", "--set", f"temporal_field.decay_max_s={decay_s}")
+    return (*FIELD, "--set", f"temporal_field.decay_min_s={decay_s}", "--set", f"temporal_field.decay_max_s={decay_s}")
 
 
 VARIANTS = [
     Variant("each event once"),
     Variant("each event once, no occluders", occluders=False),
-    Variant("the paper's field", tuple(PAPER)),
-    Variant("the paper's field, bilinear", (*PAPER, "--set", "temporal_field.kernel=bilinear")),
-    Variant("the paper's field, 5 ms everywhere", everywhere(0.005)),
-    Variant("the paper's field, 30 ms everywhere", everywhere(0.03)),
+    Variant("temporal field", tuple(FIELD)),
+    Variant("temporal field, bilinear", (*FIELD, "--set", "temporal_field.kernel=bilinear")),
+    Variant("temporal field, 5 ms everywhere", everywhere(0.005)),
+    Variant("temporal field, 30 ms everywhere", everywhere(0.03)),
+    Variant("preset paper", ("--preset", "paper")),
     Variant("each event once, no IMU", imu=False),
-    Variant("the paper's field, no IMU", tuple(PAPER), imu=False),
+    Variant("temporal field, no IMU", tuple(FIELD), imu=False),
 ]
 # Of the second table.
-DETAILED = ["each event once", "the paper's field", "each event once, no IMU", "the paper's field, no IMU"]
+DETAILED = ["each event once", "temporal field", "preset paper", "each event once, no IMU", "temporal field, no IMU"]
 
 
 def without_imu(folder, target):

@@ -114,7 +114,10 @@ std::string states_csv_row(const Update& u) {
   row += counts;
   append(&row, u.residual);
   append(&row, u.innovation);
-  return row + (u.reason.empty() ? "," : "," + quoted(u.reason)) + "\n";
+  row += ',';
+  if (!u.reason.empty()) row += quoted(u.reason);
+  row += '\n';
+  return row;
 }
 
 std::string imu_states_csv_header() {

@@ -24,10 +24,11 @@ measure() {
 }
 
 measure_target() {
+  if command -v ccache >/dev/null; then
+    measure "$1, ccache empty" ccache "$2" "$3"
+    measure "$1, ccache warm" ccache "$2" "$3"
+  fi
   measure "$1, without ccache" "" "$2" "$3"
-  command -v ccache >/dev/null || return 0
-  measure "$1, ccache empty" ccache "$2" "$3"
-  measure "$1, ccache warm" ccache "$2" "$3"
 }
 
 case "${1:-all}" in

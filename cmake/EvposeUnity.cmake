@@ -101,6 +101,4 @@ function(evpose_unity target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
   # GCC warns of a class with a member of an unnamed namespace's type wherever it takes the source for a header.
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
-  # A name within a function may be one that another source of the group has for itself.
-  target_compile_options(${target} PRIVATE -Wno-shadow)
 endfunction()

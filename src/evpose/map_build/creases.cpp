@@ -143,7 +143,7 @@ bool plane_continues(const std::vector<Eigen::Vector3d>& points, const EdgeProfi
 /// The profile across it, explained by faces at right angles, has its edge elsewhere: before books the fronts
 /// of their boards go on.
 bool CreaseFinder::contradicted_by_profile(const LineSegment& segment) const {
-  constexpr double kRightAngle = 0.94, kLeastGain = 10, kMostSigmas = 3, kMostNoise = 0.5, kInPlane = 2.5;
+  constexpr double kRightAngle = 0.94, kLeastFaceGain = 10, kMostSigmas = 3, kMostNoise = 0.5, kInPlane = 2.5;
   const double noise = surface_.scale.noise_m;
   if (segment.normal_a.cross(segment.normal_b).norm() < kRightAngle) return false;
   const Eigen::Vector3d along = segment.tangent(), middle = 0.5 * (segment.begin + segment.end);
@@ -159,7 +159,7 @@ bool CreaseFinder::contradicted_by_profile(const LineSegment& segment) const {
     if (plane_continues(points, window, kInPlane * plane.rms_m)) continue;
     const EdgeProfileFit profile = fit_edge_profile(points, window);
     const int side = over.dot(other) > 0 ? -1 : 1;  // the other face goes from the edge against `other`
-    if (profile.side != side || profile.gain < kLeastGain) continue;
+    if (profile.side != side || profile.gain < kLeastFaceGain) continue;
     if (std::abs(profile.place) > kMostNoise * noise + kMostSigmas * profile.sigma_place) return true;
   }
   return false;

@@ -84,7 +84,7 @@ class BadInput : public ::testing::Test {
       const double t = kStep_s * i;
       edges.advance(t, t >= silent_from && t < silent_to, events);
       if ((i + 1) % kStepsPerPacket != 0) continue;
-      tracker_->add_imu(test_flight::imu_at(t));
+      if (t < imu_ends_s_) tracker_->add_imu(test_flight::imu_at(t));
       const EventPacket packet = test_flight::make_packet(events, t - kStepsPerPacket * kStep_s);
       events.clear();
       const std::int64_t already = allocations;
@@ -115,6 +115,7 @@ class BadInput : public ::testing::Test {
   TrackerSetup setup_;
   TrackerConfig config_;
   std::shared_ptr<const Camera> world_camera_;  ///< if it differs from what the tracker believes
+  double imu_ends_s_ = 1e9;
   std::unique_ptr<Tracker> tracker_;
   std::vector<Update> updates_;
   std::vector<std::string> reasons_;
@@ -151,6 +152,16 @@ TEST_F(BadInput, SilenceOfTheEventsIsNamedAndTheCovarianceGrows) {
   EXPECT_GT(sigma_m(at(1.2)), 2 * sigma_m(at(0.7)));
   EXPECT_GT(sigma_m(at(2.3)), 2 * sigma_m(at(1.2)));
   EXPECT_LT(error_m(at(2.3)), 4 * sigma_m(at(2.3)));
+}
+
+TEST_F(BadInput, AnImuThatEndsIsNamedAndUpdatesGoOn) {
+  setup_.map = std::make_shared<const ContourMap>(boxes());
+  imu_ends_s_ = 0.5;
+  fly(*setup_.map, 1.0);
+  EXPECT_GT(to_seconds(updates_.back().t - kStart_ns), 0.9);
+  EXPECT_TRUE(said("no IMU samples")) << all_reasons();
+  EXPECT_NE(updates_.back().health, Health::tracking);
+  EXPECT_LT(error_m(updates_.back()), 4 * sigma_m(updates_.back()));
 }
 
 TEST_F(BadInput, NoVisiblePointIsNamed) {

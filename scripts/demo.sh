@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 cat <<'TEXT'
 evpose demo
   1. installs the packages that are missing            first time: about 2 minutes
-  2. builds the program                                first time: about 5 minutes on two cores
+  2. builds the program                                first time: about 4 minutes on two cores
   3. makes a small recording, tracks it and reports    about 1 minute
 No questions will be asked, except for a password if sudo needs one.
 

@@ -31,7 +31,6 @@ class ContrastMemory {
   /// -1, 0 (not known or no step to speak of) or +1, as ContourPoint::contrast: +1 if it is brighter where
   /// the map's normal points.
   int map_contrast(std::uint32_t segment) const;
-  std::uint32_t segments() const { return static_cast<std::uint32_t>(segments_.size()); }
 
   /// How far behind the contour its events lie, px along the motion. Late by a part of a threshold: the pixel
   /// was on average half a threshold short of its first event. And displaced towards the dark side: a pixel's

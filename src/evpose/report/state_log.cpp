@@ -4,6 +4,7 @@
 #include <cinttypes>
 #include <cstdio>
 
+#include "evpose/core/error.h"
 #include "evpose/fusion/state.h"
 
 namespace evpose {
@@ -121,7 +122,7 @@ std::string states_csv_row(const Update& u) {
 }
 
 std::string imu_states_csv_header() {
-  return std::string(kStateColumns) + ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s" + covariance_columns() + "\n";
+  return text(kStateColumns, ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s", covariance_columns(), "\n");
 }
 
 std::string imu_states_csv_row(const FusionState& s) {

@@ -50,7 +50,7 @@ inline std::string content_of(const std::string& path) { return read_text_file(p
 /// The shared data: EVPOSE_SHARED, else beside the sources.
 inline std::string shared_folder() {
   const char* variable = std::getenv("EVPOSE_SHARED");
-  return variable != nullptr ? variable : std::string(EVPOSE_SOURCE_DIR) + "/../shared";
+  return variable != nullptr ? variable : EVPOSE_SOURCE_DIR "/../shared";
 }
 
 /// The error line of what must fail; a success reads as such.

@@ -8,6 +8,7 @@
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
 #include "evpose/bench/experiments/relocalization.h"
+#include "evpose/bench/experiments/residuals.h"
 #include "evpose/bench/experiments/update_picture.h"
 #include "evpose/bench/experiments/variants.h"
 
@@ -106,6 +107,20 @@ void add_faults(CLI::App& bench, Run& run) {
   });
 }
 
+void add_residuals(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("residuals", "Where events lie beside the contours of the true pose");
+  auto request = std::make_shared<experiments::ResidualsRequest>();
+  command->add_option("recording", request->recording.folder, "a recording with truth")->required();
+  command->add_option("--map", request->recording.map, "contour map")->required();
+  command->add_option("--occluders", request->recording.occluders, "mesh that hides contours");
+  command->add_option("-o,--output", request->picture, "SVG file: offsets in the image and on the map");
+  add_settings(*command, request->assignments);
+  command->callback([=, &run] {
+    request->recording.name = request->recording.folder;
+    run = [=] { return exit_status(experiments::print_residuals(*request)); };
+  });
+}
+
 void add_picture(CLI::App& bench, Run& run) {
   auto* command = bench.add_subcommand(
       "picture", "Draw one update: its events over the contours, by what became of them");
@@ -135,6 +150,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_relocalization(*bench, run);
   add_event_origins(*bench, run);
   add_faults(*bench, run);
+  add_residuals(*bench, run);
   add_picture(*bench, run);
 }
 

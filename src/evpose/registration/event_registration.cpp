@@ -82,6 +82,13 @@ bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) cons
          std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
+ContrastMemory::EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
+  if (!config_.edge_delay) return {0, 0};
+  const double fade = std::min(1.0, std::abs(s.speed_px_s) / kFullDelay_px_s);
+  const ContrastMemory::EdgeDelay full = contrast_.edge_delay(s.segment);
+  return {fade * full.on_px, fade * full.off_px};
+}
+
 /// Gate, edge delay, weight and excluded polarities of one sample.
 EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance,
                                                    double gate) const {
@@ -89,11 +96,9 @@ EventRegistration::Line EventRegistration::line_of(const ContourSample& s, doubl
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
   const double odds = kContourPrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kContourPrior);
   const int forward = s.speed_px_s > 0 ? 1 : -1;
-  const double fade = std::min(1.0, std::abs(s.speed_px_s) / kFullDelay_px_s);
-  const ContrastMemory::EdgeDelay delay = contrast_.edge_delay(s.segment);
-  const double along_motion = config_.edge_delay ? std::copysign(fade, s.speed_px_s) : 0;
-  return {static_cast<float>(along_motion * delay.on_px),
-          static_cast<float>(along_motion * delay.off_px),
+  const ContrastMemory::EdgeDelay delay = edge_delay(s);
+  return {static_cast<float>(forward * delay.on_px),
+          static_cast<float>(forward * delay.off_px),
           static_cast<float>(gate),
           static_cast<float>(-0.5 / variance),
           static_cast<float>(odds),

@@ -57,6 +57,8 @@ class EventRegistration final : public Registration {
   /// Hands on what the map says of the contrast of a segment, -1, 0 or +1 as ContourPoint::contrast.
   void seed_contrast(std::uint32_t segment, int map_contrast) { contrast_.seed(segment, -map_contrast); }
   const ContrastMemory* contrast() const override { return &contrast_; }
+  /// How far behind this contour its events are expected, px along its motion.
+  ContrastMemory::EdgeDelay edge_delay(const ContourSample& sample) const;
 
  private:
   /// What an event needs to know of the sample that it belongs to.

@@ -125,6 +125,8 @@ class RecordingMaker {
 
  private:
   Status write_motion_and_calibration(const Trajectory& trajectory);
+  /// With the errors of `handed_over`, and the truth beside it.
+  Status write_calibration(const CalibratedCamera& truth) const;
   Status write_map(const Scene& scene, const RayCaster& rays);
   Status expose(const PreparedScene& prepared, const Camera& camera, const std::vector<PixelRay>& rays,
                 const CameraPath& path);
@@ -161,10 +163,24 @@ Status RecordingMaker::write_motion_and_calibration(const Trajectory& trajectory
   if (Status done = write_text_file(folder_.path(kScenarioFile), table.to_yaml()); !done) return done;
   if (Status done = write_tum(folder_.path("groundtruth.tum"), body); !done) return done;
   if (Status done = write_tum(folder_.path("groundtruth_camera.tum"), cam); !done) return done;
-  if (Status done = write_kalibr_camera(folder_.path("camchain-imucam.yaml"), camera); !done) return done;
+  if (Status done = write_calibration(camera); !done) return done;
   if (Status done = write_kalibr_imu(folder_.path("imu.yaml"), imu_noise(scenario_.imu)); !done) return done;
   return write_imu_csv(folder_.path("imu.csv"), simulate_imu(trajectory, end, scenario_.imu,
                                                              static_cast<std::uint64_t>(scenario_.seed)));
+}
+
+Status RecordingMaker::write_calibration(const CalibratedCamera& truth) const {
+  const std::string handed_over = folder_.path("camchain-imucam.yaml");
+  const CalibrationErrors errors =
+      draw_calibration_errors(scenario_.handed_over, static_cast<std::uint64_t>(scenario_.seed));
+  if (errors.none()) return write_kalibr_camera(handed_over, truth);
+  const CalibratedCamera wrong = with_errors(truth, errors);
+  if (const auto camera = make_camera(*wrong.intrinsics); !camera)
+    return Error{"handed_over", "the drawn errors make no camera", "take smaller sigmas or another seed"};
+  if (Status done = write_text_file(folder_.path("handed_over.yaml"), to_yaml(errors)); !done) return done;
+  if (Status done = write_kalibr_camera(folder_.path("camchain-imucam_truth.yaml"), truth); !done)
+    return done;
+  return write_kalibr_camera(handed_over, wrong);
 }
 
 Status RecordingMaker::write_map(const Scene& scene, const RayCaster& rays) {
@@ -182,7 +198,7 @@ Status RecordingMaker::expose(const PreparedScene& prepared, const Camera& camer
   auto frames = FrameCamera::create(folder_, camera.size(), scenario_.frames, end);
   if (!frames) return frames.error();
   EventPixels pixels(camera.size(), scenario_.events, static_cast<std::uint64_t>(scenario_.seed));
-  ReadOut read_out(camera.size(), scenario_.read_out);
+  ReadOut read_out(camera.size(), scenario_.read_out, static_cast<std::uint64_t>(scenario_.seed));
   PixelIntegrator integrator(prepared, camera, rays, path, scenario_.integrator, pixels, pool_);
   integrator.start(0);
   std::vector<SimEvent> events, delivered;
@@ -247,9 +263,11 @@ Expected<RecordingCounts> RecordingMaker::make() {
 
 Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::string& folder, int threads,
                                          const std::function<void(double)>& progress) {
+  const auto resolved = with_preset_values(scenario);
+  if (!resolved) return resolved.error();
   auto temporary = NewFolder::create(folder, kScenarioFile);
   if (!temporary) return temporary.error();
-  auto counts = RecordingMaker(scenario, *temporary, threads, progress).make();
+  auto counts = RecordingMaker(*resolved, *temporary, threads, progress).make();
   if (!counts) return counts;
   if (Status done = temporary->commit(); !done) return done.error();
   return counts;

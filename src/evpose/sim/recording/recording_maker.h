@@ -24,10 +24,11 @@ struct RecordingCounts {
 
 /// Makes the recording of a scenario in `folder`: events.h5, imu.csv, groundtruth.tum and
 /// groundtruth_camera.tum (exact), camchain-imucam.yaml, imu.yaml, contours.ply (true), mesh.ply (static
-/// scene), scenario.yaml (every setting), and, where the scenario enables them, frames/, depth/, map_raw.ply
-/// and events_truth.h5. The folder appears when it is complete; the result of an earlier run is replaced. The
-/// same scenario gives the same bytes, for any number of threads. `progress` is called with the completed
-/// fraction. Errors: what is wrong with the scenario; a folder that cannot be written.
+/// scene), scenario.yaml (every setting), and, where the scenario enables them, frames/, depth/, map_raw.ply,
+/// events_truth.h5, and camchain-imucam_truth.yaml and handed_over.yaml beside a calibration with errors. The
+/// folder appears when it is complete; the result of an earlier run is replaced. The same scenario gives the
+/// same bytes, for any number of threads. `progress` is called with the completed fraction. Errors: what is
+/// wrong with the scenario; a folder that cannot be written.
 Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::string& folder, int threads,
                                          const std::function<void(double fraction)>& progress);
 

@@ -39,7 +39,18 @@ void describe(ConfigTable& table, Scenario& s) {
   table.group("frames", s.frames);
   table.group("depth", s.depth);
   table.group("lidar", s.lidar);
+  table.group("handed_over", s.handed_over);
   table.group("truth", s.truth);
+}
+
+Expected<Scenario> with_preset_values(const Scenario& scenario) {
+  Scenario out = scenario;
+  const auto events = with_preset_values(scenario.events);
+  if (!events) return events.error();
+  out.events = *events;
+  out.read_out = with_preset_values(scenario.read_out, scenario.events.preset);
+  out.handed_over = with_preset_values(scenario.handed_over);
+  return out;
 }
 
 }  // namespace evpose::sim

@@ -6,8 +6,9 @@
 
 #include "evpose/core/error.h"
 #include "evpose/sim/flight/trajectory.h"
+#include "evpose/sim/recording/handed_over.h"
 #include "evpose/sim/sensors/camera_rig.h"
-#include "evpose/sim/sensors/event_pixels.h"
+#include "evpose/sim/sensors/event_sensor.h"
 #include "evpose/sim/sensors/frame_camera.h"
 #include "evpose/sim/sensors/imu_sensor.h"
 #include "evpose/sim/sensors/lidar.h"
@@ -45,14 +46,18 @@ struct Scenario {
   TrajectoryConfig trajectory;
   CameraConfig camera;
   PixelIntegratorConfig integrator;
-  EventCameraConfig events;
+  EventSensorConfig events;
   ReadOutConfig read_out;
   ImuConfig imu;
   FramesConfig frames;
   DepthConfig depth;
   LidarConfig lidar;
+  HandedOverConfig handed_over;
   TruthConfig truth;
 };
 void describe(ConfigTable& table, Scenario& scenario);
+
+/// With the values of presets for `events`, `read_out` and `handed_over`. Errors: a value out of its range.
+Expected<Scenario> with_preset_values(const Scenario& scenario);
 
 }  // namespace evpose::sim

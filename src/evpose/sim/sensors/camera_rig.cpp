@@ -18,6 +18,9 @@ CameraIntrinsics intrinsics(const CameraConfig& c) {
   } else if (c.size == SensorSize::hd) {
     size = {1280, 720};
     focal_px = 763;
+  } else if (c.size == SensorSize::davis) {
+    size = {346, 260};
+    focal_px = 206;
   }
   const double scale = size.width / 640.0;
   return {focal_px,
@@ -41,9 +44,11 @@ Pose T_body_cam(const CameraConfig& c) {
 
 void describe(ConfigTable& table, CameraConfig& c) {
   table.add("size", c.size,
-            ConfigTable::Choices<SensorSize>{
-                {"vga", SensorSize::vga}, {"720p", SensorSize::hd}, {"custom", SensorSize::custom}},
-            "640 x 480, 1280 x 720, or as width, height and focal_px say");
+            ConfigTable::Choices<SensorSize>{{"vga", SensorSize::vga},
+                                             {"720p", SensorSize::hd},
+                                             {"davis346", SensorSize::davis},
+                                             {"custom", SensorSize::custom}},
+            "640 x 480, 1280 x 720, 346 x 260, or as width, height and focal_px say");
   table.add("width", c.width, "px", "of a custom sensor", {16, 8192});
   table.add("height", c.height, "px", "of a custom sensor", {16, 8192});
   table.add("focal_px", c.focal_px, "px", "of a custom sensor", {10, 1e5});

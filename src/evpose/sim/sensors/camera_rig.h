@@ -15,6 +15,7 @@ namespace evpose::sim {
 enum class SensorSize : std::uint8_t {
   vga,     ///< 640 x 480
   hd,      ///< 1280 x 720, as of an EVK4
+  davis,   ///< 346 x 260
   custom,  ///< as width, height and focal length say
 };
 

@@ -6,7 +6,6 @@
 #include <numbers>
 #include <optional>
 
-#include "evpose/core/config.h"
 #include "evpose/core/error.h"
 
 namespace evpose::sim {
@@ -53,32 +52,6 @@ struct Crossing {
 };
 
 }  // namespace
-
-void describe(ConfigTable& table, EventCameraConfig& c) {
-  table.add("threshold_on", c.threshold_on, "", "contrast threshold of on events, in log luminance",
-            {kLeastThreshold, 10});
-  table.add("threshold_off", c.threshold_off, "", "contrast threshold of off events, in log luminance",
-            {kLeastThreshold, 10});
-  table.add("threshold_sigma", c.threshold_sigma, "", "mismatch of both between pixels, 1 sigma", {0, 1});
-  table.add("refractory_us", c.refractory_us, "us", "refractory period", {0, 1e6});
-  table.add("dark_cd_m2", c.dark_cd_m2, "cd/m^2", "dark current, as luminance added to every pixel",
-            {1e-4, 1e3});
-  table.add("bandwidth_hz_per_cd_m2", c.bandwidth_hz_per_cd_m2, "Hz m^2/cd",
-            "bandwidth of a pixel by its luminance; 0: unlimited", {0, 1e6});
-  table.add("bandwidth_max_hz", c.bandwidth_max_hz, "Hz", "bandwidth of a pixel in bright light", {1, 1e6});
-  table.add("leak_hz", c.leak_hz, "1/s", "leak events per pixel", {0, 100});
-  table.add("shot_noise_dark_hz", c.shot_noise_dark_hz, "1/s", "shot noise events per pixel in darkness",
-            {0, 1e4});
-  table.add("shot_noise_bright_hz", c.shot_noise_bright_hz, "1/s",
-            "shot noise events per pixel in bright light", {0, 1e4});
-  table.add("shot_noise_half_cd_m2", c.shot_noise_half_cd_m2, "cd/m^2",
-            "luminance where the noise is half-way between dark and bright", {1e-4, 1e6});
-  table.add("hot_pixel_fraction", c.hot_pixel_fraction, "", "fraction of hot pixels", {0, 1});
-  table.add("hot_min_hz", c.hot_min_hz, "1/s", "lowest rate of a hot pixel", {1e-3, 1e5});
-  table.add("hot_max_hz", c.hot_max_hz, "1/s", "highest rate of a hot pixel", {1e-3, 1e5});
-  table.add("reference_spread", c.reference_spread, "",
-            "initial offset of the reference from the signal, as a fraction of the threshold", {0, 1});
-}
 
 /// Log of a luminance that is linear in time, plus leak, s nanoseconds after the start of a span.
 class EventPixels::LinearLuminance {

@@ -10,10 +10,6 @@
 #include "evpose/sim/sensors/sim_event.h"
 #include "evpose/sim/world/random.h"
 
-namespace evpose {
-class ConfigTable;
-}
-
 namespace evpose::sim {
 
 /// Pixel model of an event camera.
@@ -34,7 +30,6 @@ struct EventCameraConfig {
   double reference_spread =
       1;  ///< initial offset of the reference from the signal, up to this fraction of the threshold
 };
-void describe(ConfigTable& table, EventCameraConfig& config);
 
 /// Each pixel low-pass filters its log luminance, compares it with the reference of the last reset, and
 /// triggers an event when the change exceeds its threshold. A reset takes the refractory period and sets the

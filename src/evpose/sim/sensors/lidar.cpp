@@ -9,6 +9,8 @@
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
+#include "evpose/sim/sensors/lidar_faults.h"
+#include "evpose/sim/world/moved_furniture.h"
 #include "evpose/sim/world/random.h"
 #include "evpose/sim/world/texture.h"
 
@@ -77,6 +79,12 @@ void describe(ConfigTable& table, LidarConfig& c) {
   table.add("mixed_m", c.mixed_m, "m", "limit of the mixed-pixel error at a depth step", {0, 10});
   table.add("registration_m", c.registration_m, "m", "position error of each scan, 1 sigma", {0, 10});
   table.add("registration_deg", c.registration_deg, "deg", "attitude error of each scan, 1 sigma", {0, 90});
+  table.add("registration_drift_mm_per_10m", c.registration_drift_mm_per_10m, "mm",
+            "drift of the registered scans over 10 m of way, each axis, 1 sigma", {0, 1000});
+  table.add("missing_parts", c.missing_parts, "",
+            "fraction of the scanned surface that the cloud lacks, in parts", {0, 0.95});
+  table.add("moved_furniture", c.moved_furniture, "",
+            "pieces of furniture that stood 5 to 50 cm elsewhere when the scan was made", {0, 1000});
   table.group("flight", c.flight);
 }
 
@@ -95,7 +103,11 @@ Vector3d lidar_beam(const LidarConfig& c, double t_s) {
 
 Lidar::Lidar(const RayCaster& rays, const Trajectory& trajectory, const LidarConfig& config,
              std::uint64_t seed)
-    : rays_(rays), trajectory_(trajectory), config_(config), seed_(seed) {}
+    : rays_(rays),
+      trajectory_(trajectory),
+      config_(config),
+      seed_(seed),
+      drift_(registration_drift(trajectory, config, seed)) {}
 
 int Lidar::scans() const {
   return static_cast<int>(std::ceil(trajectory_.duration_s() / config_.scan_s - 1e-9));
@@ -112,8 +124,9 @@ std::vector<CloudPoint> Lidar::scan(int number) const {
   const Pose T_body_lidar{so3::exp({0, kDegree * config_.mount_pitch_deg, 0}), Vector3d::Zero()};
   // The registration error rotates and shifts a scan about the sensor.
   const Pose T_map_middle = trajectory_.at(0.5 * (start_s + end_s)).T_map_body;
-  const Vector3d shift = normal(config_.registration_m);
-  const Eigen::Quaterniond turn = so3::exp(normal(kDegree * config_.registration_deg));
+  const Pose& drift = drift_[static_cast<std::size_t>(number)];
+  const Vector3d shift = drift.p + normal(config_.registration_m);
+  const Eigen::Quaterniond turn = drift.q * so3::exp(normal(kDegree * config_.registration_deg));
   const double least_cosine = std::cos(kDegree * config_.max_incidence_deg);
   const double radius = std::tan(0.5 * kDegree * config_.beam_deg);
   const double spacing_s = config_.keep_every / config_.points_per_s;
@@ -155,22 +168,38 @@ std::vector<CloudPoint> Lidar::scan(int number) const {
   return points;
 }
 
+namespace {
+
+Status check(const LidarConfig& config, const Trajectory& trajectory, int scans) {
+  const double beams = trajectory.duration_s() * config.points_per_s / config.keep_every;
+  if (beams > kMostPoints)
+    return Error{"lidar.keep_every", text(beams, " points are too many"),
+                 text("keep fewer than ", kMostPoints, " by a larger keep_every or a shorter flight")};
+  constexpr int kMostScans = 65536;  // numbers in the file have 16 bits
+  if (scans > kMostScans)
+    return Error{"lidar.scan_s", text(scans, " scans are too many"),
+                 text("make them longer: ", kMostScans, " at most")};
+  if (config.up_deg <= config.down_deg)
+    return Error{"lidar.up_deg", "the field of view is empty", "make it larger than lidar.down_deg"};
+  return {};
+}
+
+}  // namespace
+
 Status write_lidar(const std::string& path, const RayCaster& rays, const LidarConfig& config,
                    std::uint64_t seed, ThreadPool& pool) {
   if (!config.on) return {};
   const auto trajectory = make_trajectory(config.flight);
   if (!trajectory) return trajectory.error();
-  const Lidar lidar(rays, *trajectory, config, seed);
-  const double beams = trajectory->duration_s() * config.points_per_s / config.keep_every;
-  if (beams > kMostPoints)
-    return Error{"lidar.keep_every", text(beams, " points are too many"),
-                 text("keep fewer than ", kMostPoints, " by a larger keep_every or a shorter flight")};
-  constexpr int kMostScans = 65536;  // numbers in the file have 16 bits
-  if (lidar.scans() > kMostScans)
-    return Error{"lidar.scan_s", text(lidar.scans(), " scans are too many"),
-                 text("make them longer: ", kMostScans, " at most")};
-  if (config.up_deg <= config.down_deg)
-    return Error{"lidar.up_deg", "the field of view is empty", "make it larger than lidar.down_deg"};
+  std::optional<Scene> before;  // as it was when the scan was made
+  std::optional<RayCaster> rays_before;
+  if (config.moved_furniture > 0) {
+    auto moved = with_moved_furniture(rays.scene(), config.moved_furniture, seed);
+    if (!moved) return moved.error();
+    rays_before.emplace(before.emplace(*std::move(moved)));
+  }
+  const Lidar lidar(rays_before ? *rays_before : rays, *trajectory, config, seed);
+  if (Status fine = check(config, *trajectory, lidar.scans()); !fine) return fine;
   std::vector<std::vector<CloudPoint>> scans(static_cast<std::size_t>(lidar.scans()));
   pool.for_chunks(scans.size(), 1, [&](std::size_t chunk, std::size_t, std::size_t) {
     scans[chunk] = lidar.scan(static_cast<int>(chunk));
@@ -180,6 +209,7 @@ Status write_lidar(const std::string& path, const RayCaster& rays, const LidarCo
     cloud.insert(cloud.end(), points.begin(), points.end());
     points = {};
   }
+  leave_out_parts(config.missing_parts, seed, cloud);
   return write_ply_cloud(path, cloud);
 }
 

@@ -33,6 +33,9 @@ struct LidarConfig {
   double beam_deg = 0.14;         ///< full divergence
   double mixed_m = 0.03;          ///< limit of the mixed-pixel error of a beam across a depth step
   double registration_m = 0, registration_deg = 0;  ///< error of each scan, 1 sigma of each axis
+  double registration_drift_mm_per_10m = 0;  ///< random walk of the registered place, 1 sigma of each axis
+  double missing_parts = 0;  ///< fraction of the scanned surface that is left out, in coherent parts
+  int moved_furniture = 0;   ///< pieces that stood elsewhere when the scan was made
   TrajectoryConfig flight;
 };
 void describe(ConfigTable& table, LidarConfig& config);
@@ -55,10 +58,11 @@ class Lidar {
   const Trajectory& trajectory_;
   LidarConfig config_;
   std::uint64_t seed_;
+  std::vector<Pose> drift_;  ///< of each scan
 };
 
-/// Flies, scans and writes the merged cloud, unless off. Errors: no such flight, too many points, or the file
-/// cannot be written.
+/// Flies, scans and writes the merged cloud, unless off. Errors: no such flight, too many points, furniture
+/// that cannot be moved, or the file cannot be written.
 Status write_lidar(const std::string& path, const RayCaster& rays, const LidarConfig& config,
                    std::uint64_t seed, ThreadPool& pool);
 

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "evpose/camera/camera.h"
+#include "evpose/sim/sensors/event_filters.h"
 #include "evpose/sim/sensors/sim_event.h"
 
 namespace evpose {
@@ -14,50 +17,60 @@ class ConfigTable;
 
 namespace evpose::sim {
 
-/// Read-out of the events from the pixel array.
+class EventArbiter;
+
+enum class ReadOutKind : std::uint8_t {
+  preset,  ///< as of the sensor
+  queue,   ///< one event at a time (EventQueue)
+  rows,    ///< all events of a row at once (RowArbiter)
+  scan,    ///< in frames (FrameScan)
+};
+
+/// Read-out of the events from the pixel array, and the filters on the sensor behind it.
 struct ReadOutConfig {
-  double max_rate_mev_s = 100;  ///< limit, million events per second; 0: unlimited, nothing delayed or lost
-  int queue_events = 20000;     ///< capacity of the queue; further events are lost
+  ReadOutKind kind = ReadOutKind::preset;
+  double max_rate_mev_s = -1;  ///< limit, million events per second; 0: none; negative: the preset's
+  int queue_events = 20000;    ///< queue: its capacity; further events are lost
+  double row_ns = 40;          ///< rows: time per row besides that of its events
+  double scan_hz = 5000;       ///< scan: highest rate of frames
+  bool scan_hold = true;       ///< scan: all columns are sampled at the same moment, else one after the other
+  TrailFilterKind trail = TrailFilterKind::none;
+  double trail_ms = 10;           ///< longest time between the events of a trail
+  double rate_control_mev_s = 0;  ///< event rate controller: target; 0: off
 };
 void describe(ConfigTable& table, ReadOutConfig& config);
 
-/// A row arbiter that reads one event at a time. In a burst events queue in their rows. The arbiter visits
-/// the rows cyclically downwards and reads the events that are queued in a row at its arrival. The timestamp
-/// is the time of reading, rounded down to whole microseconds.
+/// Arbiter, trail filter and rate controller, in this order. Timestamps are whole microseconds, rounded down.
 class ReadOut {
  public:
-  ReadOut(ImageSize size, const ReadOutConfig& config);
+  /// `config`: with the values of a preset. `seed`: of the rate controller's choice.
+  ReadOut(ImageSize size, const ReadOutConfig& config, std::uint64_t seed);
+  ~ReadOut();
 
   /// `events`: sorted by t, none after `until`, none before or at the `until` of the last call. Appends to
-  /// `delivered`, in order of timestamp, the events that are read until then.
+  /// `delivered`, in order of timestamp, the events that leave the sensor until then.
   void push(std::span<const SimEvent> events, TimeNs until, std::vector<SimEvent>& delivered);
-  /// Reads the rest of the queue.
+  /// Reads the rest.
   void finish(std::vector<SimEvent>& delivered);
 
+  /// in = delivered + lost + trailing + shed once all is read.
   struct Counts {
-    std::int64_t in = 0, delivered = 0, lost = 0;
-    std::int64_t late = 0;  ///< events delivered with a later microsecond than that of their pixel
+    std::int64_t in = 0, delivered = 0;
+    std::int64_t lost = 0;  ///< for want of a place in the queue, or because the pixel's last event waited
+    std::int64_t trailing = 0;  ///< dropped by the trail filter
+    std::int64_t shed = 0;      ///< dropped by the rate controller
+    std::int64_t late = 0;      ///< read in a later microsecond than that of the pixel's event
   };
   const Counts& counts() const { return counts_; }
 
  private:
-  struct Row {
-    std::vector<SimEvent> waiting;
-    std::size_t read = 0;  ///< of these
-  };
-  TimeNs next_slot() const;
-  void add(const SimEvent& event);
-  void read_one(std::vector<SimEvent>& delivered);
-  void deliver(SimEvent event, TimeNs t, std::vector<SimEvent>& delivered);
-  std::size_t next_row() const;
+  /// What the arbiter has read passes the filters; nothing earlier than `until` follows.
+  void filter(TimeNs until, std::vector<SimEvent>& delivered);
 
-  double slot_ns_ = 0;  ///< time per event; 0: no limit
-  std::size_t queue_;
-  std::vector<Row> rows_;
-  std::vector<std::uint64_t> filled_;  ///< one bit per row where events wait
-  std::size_t waiting_ = 0, row_ = 0, left_in_row_ = 0;
-  TimeNs burst_start_ = 0;
-  std::int64_t slots_used_ = 0;  ///< since then
+  std::unique_ptr<EventArbiter> arbiter_;
+  std::optional<TrailFilter> trail_;
+  std::optional<RateController> rate_;
+  std::vector<SimEvent> read_;
   Counts counts_;
 };
 

@@ -121,13 +121,13 @@ class Yard {
     for (int i = 0; i < 4; ++i) {
       const V size(d_.random.uniform(1.3, 2.2), d_.random.uniform(0.9, 1.3), d_.random.uniform(0.8, 1.4));
       if (!find_place(0.5 * size.head<2>().norm(), size.z(), foot)) continue;
-      const std::int32_t object = d_.add_object("container");
+      const std::int32_t object = d_.add_furniture("container");
       add_box_on(d_.scene.mesh, foot, size, yaw(), d_.finish(m_.container, object), kOnGround);
     }
     for (int i = 0; i < 3; ++i) {
       const V size(d_.random.uniform(1.4, 2.2), 0.5, d_.random.uniform(0.35, 0.55));
       if (!find_place(0.5 * size.head<2>().norm(), size.z(), foot)) continue;
-      const std::int32_t object = d_.add_object("planter");
+      const std::int32_t object = d_.add_furniture("planter");
       const double turn = yaw();
       add_box_on(d_.scene.mesh, foot, size, turn, d_.finish(m_.concrete, object),
                  kOnGround & ~static_cast<unsigned>(side_above));
@@ -173,7 +173,7 @@ class Yard {
         const double y = -5.5 + 5 * i + d_.random.uniform(-0.8, 0.8);
         const V size(d_.random.uniform(0.7, 1.1), d_.random.uniform(1, 2), d_.random.uniform(0.9, 1.7));
         add_box_on(d_.scene.mesh, V(sx * 11.1, y, 0), size, d_.random.uniform(-0.15, 0.15),
-                   d_.finish(m_.container, d_.add_object("box")), kOnGround);
+                   d_.finish(m_.container, d_.add_furniture("box")), kOnGround);
       }
   }
 

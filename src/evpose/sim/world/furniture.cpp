@@ -125,7 +125,7 @@ FurnitureMaterials add_furniture_materials(WorldBuilder& builder, double texel_m
 
 void put_bookshelf(WorldBuilder& builder, const FurnitureMaterials& m, const Placement& place,
                    const Dimensions& size) {
-  const std::int32_t object = builder.add_object("bookshelf"), wood = any_of(builder, m.woods);
+  const std::int32_t object = builder.add_furniture("bookshelf"), wood = any_of(builder, m.woods);
   const double half = 0.5 * size.width, inner = half - kBoard, depth = size.depth, height = size.height;
   const auto board = [&] { return wooden(builder, wood, object); };
   put_box(builder, place, V(-half, -depth, 0), V(-inner, 0, height), board(), kNoFloor);
@@ -149,7 +149,7 @@ void put_bookshelf(WorldBuilder& builder, const FurnitureMaterials& m, const Pla
 
 void put_cupboard(WorldBuilder& builder, const FurnitureMaterials& m, const Placement& place,
                   const Dimensions& size) {
-  const std::int32_t object = builder.add_object("cupboard"), wood = any_of(builder, m.woods);
+  const std::int32_t object = builder.add_furniture("cupboard"), wood = any_of(builder, m.woods);
   const double half = 0.5 * size.width;
   put_box(builder, place, V(-half, -size.depth, 0.08), V(half, 0, size.height),
           wooden(builder, wood, object));
@@ -178,7 +178,7 @@ void put_cupboard(WorldBuilder& builder, const FurnitureMaterials& m, const Plac
 
 void put_table(WorldBuilder& builder, const FurnitureMaterials& m, const Placement& place,
                const Dimensions& size) {
-  const std::int32_t object = builder.add_object("table"), wood = any_of(builder, m.woods);
+  const std::int32_t object = builder.add_furniture("table"), wood = any_of(builder, m.woods);
   const double x = 0.5 * size.width, y = 0.5 * size.depth, top = size.height, leg = 0.06;
   put_box(builder, place, V(-x, -y, top - 0.035), V(x, y, top), wooden(builder, wood, object));
   put_box(builder, place, V(-x + 0.05, -y + 0.05, top - 0.12), V(x - 0.05, y - 0.05, top - 0.035),
@@ -205,7 +205,7 @@ void put_table(WorldBuilder& builder, const FurnitureMaterials& m, const Placeme
 }
 
 void put_chair(WorldBuilder& builder, const FurnitureMaterials& m, const Placement& place) {
-  const std::int32_t object = builder.add_object("chair"), wood = any_of(builder, m.woods);
+  const std::int32_t object = builder.add_furniture("chair"), wood = any_of(builder, m.woods);
   put_box(builder, place, V(-0.21, -0.21, 0.43), V(0.21, 0.21, 0.46),
           builder.finish(any_of(builder, m.cloths), object));
   for (const double x : {-0.2, 0.165})
@@ -222,7 +222,7 @@ void put_chair(WorldBuilder& builder, const FurnitureMaterials& m, const Placeme
 
 void put_cartons(WorldBuilder& builder, const FurnitureMaterials& m, const Placement& place, double width,
                  double highest) {
-  const std::int32_t object = builder.add_object("cartons");
+  const std::int32_t object = builder.add_furniture("cartons");
   double z = 0, w = width;
   while (w > 0.12) {
     const double height = w * builder.random.uniform(0.6, 1.0);
@@ -264,7 +264,7 @@ void put_poster(WorldBuilder& builder, const FurnitureMaterials& m, const Placem
 }
 
 void put_bench(WorldBuilder& builder, const FurnitureMaterials& m, const Placement& place, double width) {
-  const std::int32_t object = builder.add_object("bench"), wood = any_of(builder, m.woods);
+  const std::int32_t object = builder.add_furniture("bench"), wood = any_of(builder, m.woods);
   const double x = 0.5 * width;
   for (int i = 0; i < 3; ++i)
     put_box(builder, place, V(-x, -0.22 + 0.155 * i, 0.42), V(x, -0.09 + 0.155 * i, 0.46),

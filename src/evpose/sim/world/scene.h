@@ -80,8 +80,9 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Light> lights;
   std::vector<MovingPart> moving;
-  std::vector<std::string> objects;  ///< names by Mesh::object; every moving object has its own number
-  double sky_cd_m2 = 0;              ///< luminance where a ray hits nothing
+  std::vector<std::string> objects;     ///< names by Mesh::object; every moving object has its own number
+  std::vector<std::int32_t> furniture;  ///< numbers of the static objects that people move about
+  double sky_cd_m2 = 0;                 ///< luminance where a ray hits nothing
   Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< lower corner of the free space
   Eigen::Vector3d high = Eigen::Vector3d::Zero();
 };

@@ -114,14 +114,14 @@ class Street {
       } else if (pick < 0.4) {
         put_cartons(d_, furniture_, near_wall, d_.random.uniform(0.5, 0.8), 1.2);
       } else if (pick < 0.55) {
-        const std::int32_t object = d_.add_object("bin");
+        const std::int32_t object = d_.add_furniture("bin");
         put_post(d_, near_kerb.T_map_object.p, {0.24, 0.85, 28}, d_.finish(m_.container, object));
       } else if (pick < 0.75) {
         for (int i = 0; i < 4; ++i)
           put_post(d_, near_kerb.T_map_object * V(0.7 * i - 1, 0, 0), {0.07, 0.8, 20},
                    d_.finish(m_.pole, d_.add_object("bollard")));
       } else if (pick < 0.9) {
-        const std::int32_t object = d_.add_object("planter");
+        const std::int32_t object = d_.add_furniture("planter");
         put_box(d_, near_kerb, V(-0.7, -0.25, 0), V(0.7, 0.25, 0.5), d_.finish(m_.concrete, object),
                 kOnGround);
         put_box(d_, near_kerb, V(-0.6, -0.17, 0.5), V(0.6, 0.17, 0.8), d_.finish(m_.grounds[3], object),
@@ -139,7 +139,7 @@ class Street {
       const double at = x + d_.random.uniform(-0.3, 0.3);
       const Pose T{so3::exp(V(0, 0, (side > 0 ? kHalfTurn : 0) + d_.random.uniform(-0.03, 0.03))),
                    V(at, side * d_.random.uniform(2.92, 2.98), 0)};
-      add_parked_car(d_.scene.mesh, movers_, T, d_.pick(0, 2), d_.add_object("parked car"));
+      add_parked_car(d_.scene.mesh, movers_, T, d_.pick(0, 2), d_.add_furniture("parked car"));
     }
   }
 

@@ -12,6 +12,10 @@ std::int32_t WorldBuilder::add_object(const std::string& name) {
   return static_cast<std::int32_t>(scene.objects.size() - 1);
 }
 
+std::int32_t WorldBuilder::add_furniture(const std::string& name) {
+  return scene.furniture.emplace_back(add_object(name));
+}
+
 Finish WorldBuilder::finish(std::int32_t material, std::int32_t object) {
   const double u = random.uniform(0, 4), v = random.uniform(0, 4);
   return {material, object, {u, v}};

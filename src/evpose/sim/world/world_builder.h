@@ -22,6 +22,8 @@ struct WorldBuilder {
   explicit WorldBuilder(const WorldConfig& c) : config(c) {}
 
   std::int32_t add_object(const std::string& name);
+  /// An object that people move about.
+  std::int32_t add_furniture(const std::string& name);
   /// Seed for a pattern.
   std::uint64_t seed() { return random.bits(); }
   /// The material with a random texture offset.

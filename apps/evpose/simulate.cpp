@@ -96,8 +96,8 @@ int simulate(const SimulateRequest& request) {
       made->contour_points, made->frames, wall_s, wall_s / made->duration_s, request.threads);
   const sim::PixelIntegratorCounts& work = made->integrator;
   log_detail(text("integrator: ", work.blocks, " blocks, ", work.samples, " samples of pixels, ",
-                  100.0 * static_cast<double>(work.mixed_samples) / static_cast<double>(work.samples),
-                  " % of them mixed, ", work.knots, " knots between samples"));
+                  100.0 * static_cast<double>(work.border_samples) / static_cast<double>(work.samples),
+                  " % of them with a border, ", work.knots, " knots between samples"));
   return 0;
 }
 

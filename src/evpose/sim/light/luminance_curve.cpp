@@ -22,19 +22,20 @@ struct GroupLuminance {
 
 // Luminance of the two groups of the border at one end, from the sample there. A group that the sample does
 // not show has the luminance of the other end.
-bool group_luminance(const PixelSample& border, const PixelSample& at, GroupLuminance& out) {
+bool group_luminance(const PixelSample& s, const PixelSample& at, GroupLuminance& out) {
+  const BorderSample &border = s.border, &own = at.border;
   out = {border.group_luminance, border.other_luminance};
-  if (at.other >= 0 || (at.other == kSky && at.group >= 0)) {
-    if (at.group == border.group && at.other == border.other)
-      out = {at.group_luminance, at.other_luminance};
-    else if (at.group == border.other && at.other == border.group)
-      out = {at.other_luminance, at.group_luminance};
+  if (own.other >= 0 || (own.other == kSky && at.group >= 0)) {
+    if (at.group == s.group && own.other == border.other)
+      out = {own.group_luminance, own.other_luminance};
+    else if (at.group == border.other && own.other == s.group)
+      out = {own.other_luminance, own.group_luminance};
     else
       return false;
     return true;
   }
-  if (at.other != kNone) return false;
-  if (at.group == border.group)
+  if (own.other != kNone) return false;
+  if (at.group == s.group)
     out.group = at.luminance;
   else if (at.group == border.other)
     out.other = at.luminance;
@@ -43,28 +44,28 @@ bool group_luminance(const PixelSample& border, const PixelSample& at, GroupLumi
   return true;
 }
 
-bool has_border(const PixelSample& s) { return s.other != kNone && s.other != kMany; }
-
-// Adds the knots between the ends. Returns false if the border does not explain the two samples.
-bool add_border_knots(const CurveContext& c, const PixelSample& p, const PixelSample& q, const PixelRay& ray,
-                      int intervals, LuminanceCurve& curve) {
+// Adds the knots between the ends, none if the border does not explain the two samples.
+void add_border_knots(const PreparedScene& prepared, const SceneView& view0, const SceneView& view1,
+                      const PixelRay& ray, const PixelSample& p, const PixelSample& q,
+                      LuminanceCurve& curve) {
+  const int intervals = ratio(p.luminance, q.luminance) > kLargeChange ? 8 : 4;
   const PixelSample& s = has_border(q) ? q : p;
   GroupLuminance from{}, to{};
-  if (!group_luminance(s, p, from) || !group_luminance(s, q, to)) return false;
-  const Border first = border_of(c.prepared, c.from, s), last = border_of(c.prepared, c.to, s);
+  if (!group_luminance(s, p, from) || !group_luminance(s, q, to)) return;
+  const Border first = border_of(prepared, view0, s.border), last = border_of(prepared, view1, s.border);
   const float level0 = first.level(ray), level1 = last.level(ray);
   const Eigen::Vector2f slope0 = first.slope(ray), slope1 = last.slope(ray);
   const auto at = [&](float fraction) {
     const float above = fraction_above(level0 + fraction * (level1 - level0),
                                        Eigen::Vector2f(slope0 + fraction * (slope1 - slope0)));
-    const float in_group = s.group_above ? above : 1 - above;
+    const float in_group = s.border.group_above ? above : 1 - above;
     return in_group * (from.group + fraction * (to.group - from.group)) +
            (1 - in_group) * (from.other + fraction * (to.other - from.other));
   };
-  if (ratio(at(0), p.luminance) > kLargestMisfit || ratio(at(1), q.luminance) > kLargestMisfit) return false;
+  if (ratio(at(0), p.luminance) > kLargestMisfit || ratio(at(1), q.luminance) > kLargestMisfit) return;
   // The border touches the pixel from `enters` to `leaves`, where the slope of the luminance changes.
   const float reach = 0.25F * (slope0 + slope1).cwiseAbs().sum(), motion = level1 - level0;
-  if (!(std::abs(motion) > 1e-3F * reach)) return false;
+  if (!(std::abs(motion) > 1e-3F * reach)) return;
   const float one = (-reach - level0) / motion, two = (reach - level0) / motion;
   const float enters = std::clamp(std::min(one, two), 0.0F, 1.0F),
               leaves = std::clamp(std::max(one, two), 0.0F, 1.0F);
@@ -72,7 +73,6 @@ bool add_border_knots(const CurveContext& c, const PixelSample& p, const PixelSa
     const float fraction = enters + (leaves - enters) * static_cast<float>(k) / static_cast<float>(intervals);
     if (fraction > curve.time[curve.knots - 1] && fraction < 1) curve.add(fraction, at(fraction));
   }
-  return true;
 }
 
 }  // namespace
@@ -88,23 +88,16 @@ float LuminanceCurve::integral(double open, double close) const {
   return static_cast<float>(sum);
 }
 
-LuminanceCurve luminance_curve(const CurveContext& c, const PixelSample& p, const PixelSample& q,
-                               const TilePlan& plan, int x, int y) {
+int texture_samples_between(float p, float q) {
+  const float change = ratio(p, q);
+  return change > kLargeChange ? 3 : change > kModerateChange ? 1 : 0;
+}
+
+LuminanceCurve border_curve(const PreparedScene& prepared, const SceneView& from, const SceneView& to,
+                            const PixelRay& ray, const PixelSample& p, const PixelSample& q) {
   LuminanceCurve curve;
   curve.add(0, p.luminance);
-  const float change = ratio(p.luminance, q.luminance);
-  const int column = plan.tile.x0 + x, row = plan.tile.y0 + y;
-  const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
-  if (nearly_equal(p, q)) {
-    // A straight line is good enough.
-  } else if (has_border(p) || has_border(q)) {
-    add_border_knots(c, p, q, c.sampler.ray(column, row), change > kLargeChange ? 8 : 4, curve);
-  } else if (plan.pixel[i] == PixelClass::flat && plan.patch[i] >= 0 && change > kModerateChange) {
-    const int step = change > kLargeChange ? 1 : 2;
-    for (int k = step; k < 4; k += step)
-      curve.add(0.25F * static_cast<float>(k),
-                c.sampler.flat_luminance(c.at_quarter(k), plan.patch[i], column, row));
-  }
+  add_border_knots(prepared, from, to, ray, p, q, curve);
   curve.add(1, q.luminance);
   return curve;
 }

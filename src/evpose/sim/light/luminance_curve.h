@@ -2,28 +2,10 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
-#include "evpose/core/time.h"
-#include "evpose/sim/light/tile_sampler.h"
+#include "evpose/sim/light/tile_samples.h"
 
 namespace evpose::sim {
-
-/// Two samples of a tile and what is needed to evaluate luminance between them.
-struct CurveContext {
-  const PreparedScene& prepared;
-  const TileSampler& sampler;
-  const SceneView &from, &to;
-  TimeNs t0, t1;
-  mutable std::array<std::optional<SceneView>, 3> quarters{};  ///< made at the first request
-
-  /// View at one, two or three quarters of the interval.
-  const SceneView& at_quarter(int k) const {
-    auto& view = quarters[k - 1];
-    if (!view) view = interpolate_view(from, to, 0.25 * k);
-    return *view;
-  }
-};
 
 /// Luminance of a pixel between two samples, linear between knots. Times are fractions of the interval.
 struct LuminanceCurve {
@@ -39,15 +21,19 @@ struct LuminanceCurve {
   float integral(double open, double close) const;
 };
 
-/// True if luminance between the samples may be taken as linear.
-inline bool nearly_equal(const PixelSample& p, const PixelSample& q) {
-  constexpr float kLargestRatio = 1.08F;
-  return p.luminance <= kLargestRatio * q.luminance && q.luminance <= kLargestRatio * p.luminance;
-}
+/// Largest ratio of two samples between which luminance may be taken as linear.
+inline constexpr float kLinearRatio = 1.08F;
+inline bool nearly_equal(float p, float q) { return p <= kLinearRatio * q && q <= kLinearRatio * p; }
 
-/// `p` and `q` are the samples of pixel (x, y) of the tile at the two ends. Small changes are taken as
-/// linear. A border that crosses the pixel moves along its line; a texture is sampled again in between.
-LuminanceCurve luminance_curve(const CurveContext& context, const PixelSample& p, const PixelSample& q,
-                               const TilePlan& plan, int x, int y);
+/// Samples of a texture wanted between two that differ so much: 0, 1 or 3, evenly spaced.
+int texture_samples_between(float p, float q);
+
+/// True if the border between two groups is known.
+inline bool has_border(const PixelSample& s) { return s.border.other != kNone && s.border.other != kMany; }
+
+/// The curve between samples `p` and `q`, seen in the views `from` and `to`, one of which has a border: it
+/// moves along its line. The curve is a straight line where the border does not explain both samples.
+LuminanceCurve border_curve(const PreparedScene& prepared, const SceneView& from, const SceneView& to,
+                            const PixelRay& ray, const PixelSample& p, const PixelSample& q);
 
 }  // namespace evpose::sim

@@ -14,28 +14,36 @@ namespace {
 constexpr std::size_t kMostChannels = 16;
 
 // Illuminance of the light map, each channel weighted by its factor.
-float baked_light(const LightMap& map, const std::vector<float>& factors, float right, float up) {
+template <class V>
+V baked_light(const LightMap& map, const std::vector<float>& factors, V right, V up) {
+  using Int = typename LaneTypes<V>::Int;
   const auto per_metre = static_cast<float>(map.per_metre);
-  const float x = std::clamp(right * per_metre, 0.0F, static_cast<float>(map.columns - 1));
-  const float y = std::clamp(up * per_metre, 0.0F, static_cast<float>(map.rows - 1));
-  const int i = std::min(static_cast<int>(x), std::max(map.columns - 2, 0)),
-            j = std::min(static_cast<int>(y), std::max(map.rows - 2, 0));
+  const auto clamped = [](V v, int most) {
+    v = select(v > 0.0F, v, all<V>(0));  // also where it is not a number
+    return smaller(v, all<V>(static_cast<float>(most)));
+  };
+  const V x = clamped(right * per_metre, map.columns - 1), y = clamped(up * per_metre, map.rows - 1);
+  const Int i = smaller(to_int(x), Int(Int{} + std::max(map.columns - 2, 0))),
+            j = smaller(to_int(y), Int(Int{} + std::max(map.rows - 2, 0)));
   const int di = map.columns > 1 ? 1 : 0, dj = map.rows > 1 ? map.columns : 0;
-  const float a = x - static_cast<float>(i), b = y - static_cast<float>(j);
+  const V a = x - to_float(i), b = y - to_float(j);
   const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows;
-  const float* value = &map.values[static_cast<std::size_t>(j) * map.columns + i];
-  float sum = 0;
+  const Int at = j * map.columns + i;
+  const float* values = map.values.data();
+  V sum{};
   for (const float factor : factors) {
-    const float low = value[0] + a * (value[di] - value[0]);
-    const float high = value[dj] + a * (value[dj + di] - value[dj]);
-    sum += factor * (low + b * (high - low));
-    value += texels;
+    const V low0 = gather(values, at), high0 = gather(values + dj, at);
+    const V low = low0 + a * (gather(values + di, at) - low0);
+    const V high = high0 + a * (gather(values + dj + di, at) - high0);
+    sum = sum + factor * (low + b * (high - low));
+    values += texels;
   }
   return sum;
 }
 
 float moving_light(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
-                   const Eigen::Vector3f& ray_cam, float depth) {
+                   const RayAreas<float>& ray, float depth) {
+  const Eigen::Vector3f ray_cam(ray.x, ray.y, 1);
   std::array<float, kMostChannels> by_channel{};
   const Eigen::Vector3d point = view.T_map_cam * (depth * ray_cam).cast<double>();
   Eigen::Vector3d normal = view.T_map_part[patch.part].q * patch.patch->normal;
@@ -45,6 +53,13 @@ float moving_light(const PreparedScene& prepared, const SceneView& view, const P
   float sum = 0;
   for (std::size_t i = 0; i < view.light.size(); ++i) sum += view.light[i] * by_channel[i];
   return sum;
+}
+FloatLanes moving_light(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+                        const RayAreas<FloatLanes>& r, FloatLanes depth) {
+  FloatLanes out;
+  for (int i = 0; i < kLanes; ++i)
+    out[i] = moving_light(prepared, view, patch, RayAreas<float>{r.x[i], r.y[i], 0, 0, 0, 0}, depth[i]);
+  return out;
 }
 
 }  // namespace
@@ -94,30 +109,47 @@ PatchView make_patch_view(const SceneView& view, const Patch& patch, int part) {
   return out;
 }
 
-float luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
-                const PixelRay& ray, float x, float y) {
-  const Eigen::Vector3f r = ray.direction(x, y);
-  const float inverse = 1 / patch.normal.dot(r), depth = patch.reach * inverse;
+template <class V>
+V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+            const RayAreas<V>& r) {
+  const auto along = [&r](const Eigen::Vector3f& axis) {
+    return V(axis.x() * r.x + axis.y() * r.y + axis.z());
+  };
+  const V inverse = 1.0F / along(patch.normal), depth = patch.reach * inverse;
   const Material& material = prepared.scene.materials[patch.patch->material];
-  auto reflectance = static_cast<float>(material.reflectance);
+  V reflectance = all<V>(static_cast<float>(material.reflectance));
   if (material.texture) {
-    const float along_u = patch.u_axis.dot(r), along_v = patch.v_axis.dot(r);
-    const auto change = [&](const Eigen::Vector2f& step) -> Eigen::Vector2f {
-      const float turn = patch.normal.head<2>().dot(step) * inverse;
-      return {depth * (patch.u_axis.head<2>().dot(step) - along_u * turn),
-              depth * (patch.v_axis.head<2>().dot(step) - along_v * turn)};
+    const V along_u = along(patch.u_axis), along_v = along(patch.v_axis);
+    const auto change = [&](const V& dx, const V& dy, const Eigen::Vector3f& axis, const V& value) {
+      const V turn = (patch.normal.x() * dx + patch.normal.y() * dy) * inverse;
+      return V(depth * (axis.x() * dx + axis.y() * dy - value * turn));
     };
-    reflectance *= material.texture->mean(patch.u + depth * along_u, patch.v + depth * along_v,
-                                          change(ray.per_column), change(ray.per_row));
+    reflectance = reflectance * material.texture->mean(Texture::Footprint<V>{
+                                    patch.u + depth * along_u, patch.v + depth * along_v,
+                                    change(r.column_x, r.column_y, patch.u_axis, along_u),
+                                    change(r.column_x, r.column_y, patch.v_axis, along_v),
+                                    change(r.row_x, r.row_y, patch.u_axis, along_u),
+                                    change(r.row_x, r.row_y, patch.v_axis, along_v)});
   }
   const LightMap& map = patch.patch->light;
-  const float lux = map.columns > 0 ? baked_light(map, view.light, patch.right0 + depth * patch.right.dot(r),
-                                                  patch.up0 + depth * patch.up.dot(r))
-                                    : moving_light(prepared, view, patch, r, depth);
+  const V lux = map.columns > 0 ? baked_light(map, view.light, V(patch.right0 + depth * along(patch.right)),
+                                              V(patch.up0 + depth * along(patch.up)))
+                                : moving_light(prepared, view, patch, r, depth);
   auto emission = static_cast<float>(material.emission_cd_m2);
   if (emission > 0 && material.emission_light >= 0)
     emission *= view.light[prepared.channels.of_light[material.emission_light]];
   return reflectance * lux * std::numbers::inv_pi_v<float> + emission;
+}
+template float luminance(const PreparedScene&, const SceneView&, const PatchView&, const RayAreas<float>&);
+template FloatLanes luminance(const PreparedScene&, const SceneView&, const PatchView&,
+                              const RayAreas<FloatLanes>&);
+
+float luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+                const PixelRay& ray, float x, float y) {
+  const Eigen::Vector3f r = ray.direction(x, y);
+  return luminance(prepared, view, patch,
+                   RayAreas<float>{r.x(), r.y(), ray.per_column.x(), ray.per_column.y(), ray.per_row.x(),
+                                   ray.per_row.y()});
 }
 
 }  // namespace evpose::sim

@@ -6,6 +6,7 @@
 
 #include "evpose/sim/light/pixel_rays.h"
 #include "evpose/sim/light/prepared_scene.h"
+#include "evpose/sim/world/lanes.h"
 
 namespace evpose::sim {
 
@@ -32,6 +33,16 @@ struct PatchView {
 };
 PatchView make_patch_view(const SceneView& view, const Patch& patch, int part);
 
+/// Directions (x, y, 1) and the areas around them, spanned by their change by column and row; of one pixel or
+/// of eight.
+template <class V>
+struct RayAreas {
+  V x, y, column_x, column_y, row_x, row_y;
+};
+/// Mean luminance over each area, cd/m^2.
+template <class V>
+V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+            const RayAreas<V>& areas);
 /// Mean luminance over the area of the pixel of `ray`, around its point (x, y), cd/m^2.
 float luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
                 const PixelRay& ray, float x = 0, float y = 0);

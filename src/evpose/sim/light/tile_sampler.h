@@ -3,74 +3,24 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "evpose/sim/light/scene_view.h"
+#include "evpose/sim/light/shade_queue.h"
+#include "evpose/sim/light/tile_samples.h"
 
 namespace evpose::sim {
 
-inline constexpr std::int32_t kSky = -1;   ///< group where there is no surface
-inline constexpr std::int32_t kNone = -2;  ///< no second group: one group fills the pixel
-inline constexpr std::int32_t kMany = -3;  ///< more than two groups, or a border that is not a straight line
-
-/// Content of a pixel at one instant. Where it shows two groups, their border is kept, so that luminance can
-/// be interpolated while the border moves.
-struct PixelSample {
-  float luminance = 0;  ///< cd/m^2, mean over the pixel
-  std::int32_t group = kSky, other = kNone;
-  std::uint16_t object = 0;  ///< at the centre
-  std::int8_t part = -1;     ///< at the centre: moving part, -1: none
-  bool moving = false;       ///< the pixel shows a moving part
-  bool outline = false;      ///< the pixel contains a geometric edge
-  // The rest is valid where `other` is a group.
-  float group_luminance = 0, other_luminance = 0;  ///< luminance of the two
-  bool group_above = false;                        ///< `group` is on the positive side of the border
-  std::uint8_t edge = 0;  ///< 0 to 2: of a triangle; 3: intersection of two static planes
-  std::int8_t edge_part = -1;
-  std::uint32_t a = 0, b = 0;  ///< triangle, or the two patches
-};
-
-/// A straight border between two groups in the image: the zero line of function . (x, y, 1).
-struct Border {
-  Eigen::Vector3d function;
-  float level(const PixelRay& ray) const {
-    return static_cast<float>(function.dot(ray.direction().cast<double>()));
-  }
-  Eigen::Vector2f slope(const PixelRay& ray) const {
-    const Eigen::Vector2f f = function.head<2>().cast<float>();
-    return {f.dot(ray.per_column), f.dot(ray.per_row)};
-  }
-  float fraction_above(const PixelRay& ray) const { return sim::fraction_above(level(ray), slope(ray)); }
-};
-Border border_of(const PreparedScene& prepared, const SceneView& view, const PixelSample& sample);
-
-/// What a pixel may show during a block.
-enum class PixelClass : std::uint8_t {
-  flat,    ///< one patch
-  smooth,  ///< one group
-  mixed,   ///< several groups or moving parts
-};
-
-inline constexpr int kTilePx = 16;
-
-/// A square of the image.
-struct Tile {
-  int x0 = 0, y0 = 0, width = 0, height = 0;  ///< up to kTilePx each way
-};
-
-/// Class of each pixel of a tile, known before it is sampled; index: row by row, kTilePx apart.
+/// What a tile may show during a block.
 struct TilePlan {
   Tile tile;
-  std::array<PixelClass, kTilePx * kTilePx> pixel{};
-  std::array<std::int32_t, kTilePx * kTilePx> patch{};  ///< of flat pixels
+  std::span<const std::uint32_t> triangles;  ///< static, nearest first
   struct Mover {
     int part;
     int x0, y0, x1, y1;  ///< pixels that it may cover: [x0, x1) x [y0, y1)
   };
   std::vector<Mover> movers;
 };
-
-using TileSamples = std::array<PixelSample, kTilePx * kTilePx>;
 
 /// Mean luminance of each pixel of a tile at one instant. A pixel that one surface fills is shaded once.
 /// Where two surfaces meet in a pixel, each is weighted by its area on its side of the edge line. In more
@@ -81,56 +31,90 @@ class TileSampler {
   TileSampler(const PreparedScene& prepared, const std::vector<PixelRay>& rays, ImageSize size)
       : prepared_(prepared), rays_(rays), size_(size) {}
 
-  void sample(const SceneView& view, const TilePlan& plan, TileSamples& out);
+  /// Keeps a reference to the plan.
+  void set_plan(const TilePlan& plan);
+  void sample(const SceneView& view, TileSamples& out);
 
-  /// One pixel of one patch at another instant.
-  float flat_luminance(const SceneView& view, std::int32_t patch, int x, int y) const {
-    return luminance(prepared_, view, make_patch_view(view, prepared_.still.patches[patch], -1), ray(x, y));
+  /// Luminance of pixels of static patches at another instant: `add` each, then `shade`.
+  class Again {
+   public:
+    Again(TileSampler& sampler, const SceneView& view) : sampler_(sampler) {
+      sampler.queue_.set_view(sampler.prepared_, view);
+    }
+    std::size_t add(std::size_t pixel, std::int32_t patch) {
+      return sampler_.queue_.add(sampler_.queue_.number_of(-1, patch), pixel, sampler_.raster_.x()[pixel],
+                                 sampler_.raster_.y()[pixel]);
+    }
+    void shade() { sampler_.queue_.shade(); }
+    float luminance(std::size_t answer) const { return sampler_.queue_.luminance(answer); }
+
+   private:
+    TileSampler& sampler_;
+  };
+
+  /// Depth of the nearest static surface in a view, m; infinite: only sky.
+  float nearest_m(const SceneView& view);
+
+  const PixelRay& ray(std::size_t pixel) const {
+    const std::size_t x = pixel % kTilePx, y = pixel / kTilePx;
+    return rays_[(plan_->tile.y0 + y) * size_.width + plan_->tile.x0 + x];
   }
-  const PixelRay& ray(int x, int y) const { return rays_[static_cast<std::size_t>(y) * size_.width + x]; }
 
  private:
   struct Hit {
     std::int32_t group = kSky, patch = -1;
     int part = -1;
     std::uint32_t triangle = 0;
-    float depth = 0;
+    std::int32_t shape = kSky;                     ///< of static surfaces: in the raster
+    float nearness = 0;                            ///< 1 / m
     Eigen::Vector2f at = Eigen::Vector2f::Zero();  ///< offset from the centre of the pixel, px
   };
-  struct Batch;
+  using Hits = std::array<Hit, 5>;  ///< of the centre and the corners, corners row by row
+  /// A pixel whose luminance waits for that of its surfaces.
+  struct Pending {
+    std::size_t pixel;
+    float weight;
+    std::size_t answer;
+  };
+  struct Side {
+    std::size_t pixel, group_answer, other_answer;
+    float fraction;  ///< of the pixel that the group fills
+  };
 
-  Hit trace(const PixelRay& ray, float x, float y) const;
-  Hit hit_of(std::uint32_t triangle, float depth, int part) const;
-  void add_movers(const PixelRay& ray, float x, float y, Hit& hit) const;
-  void find_movers(int x, int y);
-  void trace_centres();
-  void trace_corners();
-  bool near_border(int x, int y) const;
-  std::array<Hit, 5> centre_and_corners(int x, int y) const;
-  float shade(const Hit& hit, const PixelRay& ray, float x, float y);
-  const PatchView& patch_view(int part, std::int32_t patch);
-  void sample_mixed(int x, int y, PixelSample& out);
-  void sample_border(int x, int y, PixelSample& out);
-  bool fit_border(const PixelRay& ray, const std::array<Hit, 5>& hits, PixelSample& out);
-  bool separates(const Border& border, const PixelRay& ray, const std::array<Hit, 5>& hits,
-                 PixelSample& out) const;
+  Hit hit_of(std::int32_t shape, float x, float y) const;
+  void add_movers(float x, float y, Hit& hit) const;
+  void trace_movers();
+  Hit hit_at(std::size_t place) const;
+  std::int32_t number_of_shape(std::int32_t shape);
+  bool find_movers(std::size_t pixel);
+  void sample_uniform(TileSamples& out);
+  void sample_pixels(TileSamples& out);
+  void sample_inside(std::size_t pixel, TileSamples& out);
+  void sample_border(std::size_t pixel, TileSamples& out);
+  Hits hits_of(std::size_t pixel) const;
+  std::size_t want(const Hit& hit, std::size_t pixel, float x, float y);
+  void want_sides(std::size_t pixel, const Hits& hits, BorderSample& border);
+  void want_scan_lines(std::size_t pixel, const Hits& hits);
+  std::array<Hit, kLanes> hits_along(const PixelRay& ray,
+                                     const std::array<Eigen::Vector2f, kLanes>& at) const;
+  bool fit_border(const PixelRay& ray, const Hits& hits, std::int32_t group, BorderSample& out) const;
+  bool separates(const Border& border, const PixelRay& ray, const Hits& hits, std::int32_t group,
+                 BorderSample& out) const;
   bool is_geometric_edge(const Hit& a, const Hit& b, const PixelRay& ray) const;
-  float scan_lines_luminance(const PixelRay& ray, const std::array<Hit, 5>& hits);
-  void copy_hit(const Hit& hit, PixelSample& out) const;
+  void set_centre(const Hit& hit, std::size_t pixel, TileSamples& out) const;
 
   const PreparedScene& prepared_;
   const std::vector<PixelRay>& rays_;
   ImageSize size_;
   const SceneView* view_ = nullptr;
   const TilePlan* plan_ = nullptr;
-  std::vector<int> movers_;  ///< moving parts that may cover the current pixel
-  std::vector<PatchView> patch_views_;
-  std::size_t last_view_ = 0;
-  static constexpr int kCorners = kTilePx + 1;
-  std::array<Hit, kTilePx * kTilePx> centres_;
-  std::array<bool, kTilePx * kTilePx>
-      at_border_{};  ///< mixed pixels that need more than the ray of their centre
-  std::array<Hit, kCorners * kCorners> corners_;
+  TileRaster raster_;
+  ShadeQueue queue_;
+  std::vector<std::int32_t> numbers_;  ///< in the queue, of each shape
+  std::vector<int> movers_;            ///< moving parts that may cover the current pixel
+  std::vector<Hit> moved_;             ///< at all places; empty: nothing moves here
+  std::vector<Pending> pending_;
+  std::vector<Side> sides_;
 };
 
 }  // namespace evpose::sim

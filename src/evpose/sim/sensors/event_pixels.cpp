@@ -128,7 +128,12 @@ EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::u
       dark_(static_cast<float>(config.dark_cd_m2)),
       leak_per_s_(config.leak_hz * config.threshold_on),
       refractory_ns_(from_seconds(1e-6 * config.refractory_us)),
-      pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)) {
+      low_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
+      high_(low_.size()),
+      filtered_(low_.size()),
+      log_last_(low_.size()),
+      wake_(low_.size()),
+      pixels_(low_.size()) {
   EVPOSE_CHECK(config.dark_cd_m2 > 0 && config.threshold_on > 0 && config.threshold_off > 0);
   if (band_limited_) {
     tau_fast_s_ = 0.5 / (std::numbers::pi * config.bandwidth_max_hz);
@@ -148,16 +153,16 @@ EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::u
 void EventPixels::start(std::size_t pixel, TimeNs t, float luminance_cd_m2) {
   Pixel& p = pixels_[pixel];
   const double level = std::max(0.0F, luminance_cd_m2) + dark_;
-  p.filtered = std::log(level);
-  p.log_last = static_cast<float>(p.filtered);
+  const double log_level = std::log(level);
+  filtered_[pixel] = log_last_[pixel] = static_cast<float>(log_level);
   draw_next_noise(pixel, t);
   // Uniform between the two thresholds.
   const double fraction = config_.reference_spread * p.random.uniform(-1, 1);
-  set_reference(p, p.filtered, t);
+  set_reference(p, log_level, t);
   const double offset = fraction * (fraction < 0 ? p.on : p.off);
   p.reference += offset;
   p.log_leak += static_cast<float>(0.5 * offset);
-  set_bounds(p, t);
+  set_bounds(pixel, t);
 }
 
 double EventPixels::hot_rate_hz(std::size_t pixel) const {
@@ -192,13 +197,14 @@ void EventPixels::set_reference(Pixel& p, double log_luminance, TimeNs t) const 
   p.log_leak = static_cast<float>(log_luminance + 0.5 * p.on);
 }
 
-void EventPixels::set_bounds(Pixel& p, TimeNs t) const {
-  p.wake = std::min(p.next_noise, t + kHorizon);
-  double high = p.reference + p.on - leak_per_s_ * seconds(p.wake) - kSlack;
+void EventPixels::set_bounds(std::size_t pixel, TimeNs t) {
+  const Pixel& p = pixels_[pixel];
+  wake_[pixel] = std::min(p.next_noise, t + kHorizon);
+  double high = p.reference + p.on - leak_per_s_ * seconds(wake_[pixel]) - kSlack;
   double low = p.reference - p.off - leak_per_s_ * seconds(t) + kSlack;
   if (!band_limited_) high = std::exp(high), low = std::exp(low);
-  p.high = static_cast<float>(high);
-  p.low = static_cast<float>(low);
+  high_[pixel] = static_cast<float>(high);
+  low_[pixel] = static_cast<float>(low);
 }
 
 void EventPixels::fire(std::size_t pixel, TimeNs t, bool on, EventCause cause,
@@ -220,11 +226,11 @@ void EventPixels::emit_events(std::size_t pixel, TimeNs t0, TimeNs t1, const Sig
   const auto since = [&](TimeNs t) { return static_cast<double>(t - t0); };
   TimeNs now = t0;
   while (true) {
-    if (p.high == kInfinity) {  // in reset: the reference follows the signal
-      if (p.wake > t1) return;
-      now = std::max(now, p.wake);
+    if (high_[pixel] == kInfinity) {  // in reset: the reference follows the signal
+      if (wake_[pixel] > t1) return;
+      now = std::max(now, wake_[pixel]);
       set_reference(p, signal.log_luminance(since(now)), now);
-      p.high = p.low = 0;
+      high_[pixel] = low_[pixel] = 0;
     }
     while (p.next_noise < now) draw_next_noise(pixel, p.next_noise);  // noise during a reset is lost
     const auto crossing =
@@ -249,12 +255,12 @@ void EventPixels::emit_events(std::size_t pixel, TimeNs t0, TimeNs t1, const Sig
       p.log_leak = static_cast<float>(log_luminance + 0.5 * p.on);
     }
     if (refractory_ns_ > 0) {
-      p.low = -kInfinity;
-      p.high = kInfinity;
-      p.wake = now + refractory_ns_;
+      low_[pixel] = -kInfinity;
+      high_[pixel] = kInfinity;
+      wake_[pixel] = now + refractory_ns_;
     }
   }
-  set_bounds(p, t1);
+  set_bounds(pixel, t1);
 }
 
 void EventPixels::advance_unfiltered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
@@ -265,7 +271,7 @@ void EventPixels::advance_unfiltered(std::size_t pixel, const Span& span, std::v
 }
 
 void EventPixels::advance_filtered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
-  Pixel& p = pixels_[pixel];
+  float &log_last = log_last_[pixel], &filtered = filtered_[pixel];
   const double from = std::max(0.0, span.from) + dark_, to = std::max(0.0, span.to) + dark_;
   const double change = std::log(to / from);
   const int steps = 1 + static_cast<int>(std::abs(change) / kSmallChange);
@@ -280,11 +286,11 @@ void EventPixels::advance_filtered(std::size_t pixel, const Span& span, std::vec
       const double mean = 0.5 * (level + next), length_ns = static_cast<double>(t_next - t);
       const double log_next = std::log(next);
       const LowPassResponse response(
-          {p.log_last, log_next, mean, p.filtered, length_ns, 1e9 * time_constant_s(mean)},
+          {log_last, log_next, mean, filtered, length_ns, 1e9 * time_constant_s(mean)},
           leak_per_s_ * seconds(t), 1e-9 * leak_per_s_);
       emit_events(pixel, t, t_next, response, events);
-      p.filtered = response.log_luminance(length_ns);
-      p.log_last = static_cast<float>(log_next);
+      filtered = static_cast<float>(response.log_luminance(length_ns));
+      log_last = static_cast<float>(log_next);
     }
     level = next;
     t = t_next;

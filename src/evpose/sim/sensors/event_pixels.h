@@ -8,6 +8,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/sim/sensors/sim_event.h"
+#include "evpose/sim/world/lanes.h"
 #include "evpose/sim/world/random.h"
 
 namespace evpose::sim {
@@ -50,26 +51,37 @@ class EventPixels {
   /// span of the pixel. Appends its events in (t0, t1] in order of time, with t, x, y, on and cause.
   /// Different pixels may be advanced at the same time by different threads.
   void advance(std::size_t pixel, TimeNs t0, TimeNs t1, float from, float to, std::vector<SimEvent>& events) {
-    Pixel& p = pixels_[pixel];
-    if (!band_limited_) {
-      const float level = to + dark_;
-      if (level < p.high && level > p.low && t1 < p.wake) return;
-      advance_unfiltered(pixel, {t0, t1, from, to}, events);
-    } else if (!advance_without_event(p, t0, t1, from, to)) {
+    Quiet<float> next{from, to, low_[pixel], high_[pixel], log_last_[pixel], filtered_[pixel]};
+    if (t1 < wake_[pixel] && stays_quiet(t1 - t0, next)) {
+      log_last_[pixel] = next.log_last;
+      filtered_[pixel] = next.filtered;
+    } else if (band_limited_) {
       advance_filtered(pixel, {t0, t1, from, to}, events);
+    } else {
+      advance_unfiltered(pixel, {t0, t1, from, to}, events);
     }
   }
 
+  /// The same for those of kLanes pixels, from `first` on, that are `wanted` and trigger no event; returns
+  /// them, a bit for each. Nothing happens to the others.
+  unsigned advance_quiet(std::size_t first, TimeNs t0, TimeNs t1, FloatLanes from, FloatLanes to,
+                         IntLanes wanted) {
+    Quiet<FloatLanes> next{
+        from, to, load(&low_[first]), load(&high_[first]), load(&log_last_[first]), load(&filtered_[first])};
+    const FloatLanes log_last = next.log_last, filtered = next.filtered;
+    IntLanes quiet;
+    for (int i = 0; i < kLanes; ++i) quiet[i] = t1 < wake_[first + i] ? -1 : 0;
+    quiet &= wanted;
+    quiet &= stays_quiet(t1 - t0, next);
+    store(&log_last_[first], select(quiet, next.log_last, log_last));
+    store(&filtered_[first], select(quiet, next.filtered, filtered));
+    return bits_of(quiet);
+  }
+
  private:
-  /// A cache line. "Signal" is filtered log luminance plus leak * time.
-  struct alignas(64) Pixel {
-    // No event before `wake` while the luminance with dark current (without a low pass) or the filtered log
-    // luminance (with it) stays between these bounds. In reset they are infinite and `wake` is its end.
-    float low = 0, high = 0;
-    TimeNs wake = 0;
-    double filtered = 0;    ///< log luminance after the low pass
+  /// What seldom changes. "Signal" is filtered log luminance plus leak * time.
+  struct Pixel {
     double reference = 0;   ///< signal
-    float log_last = 0;     ///< log luminance before the low pass
     float log_leak = 0;     ///< an on event below this filtered log luminance is a leak event
     float on = 0, off = 0;  ///< thresholds
     TimeNs next_noise = 0;
@@ -83,35 +95,38 @@ class EventPixels {
   class LowPassResponse;
 
   double time_constant_s(double level) const { return tau_fast_s_ + tau_dim_s_ / level; }
-  /// Advances the pixel and returns true if the span triggers no event.
-  bool advance_without_event(Pixel& p, TimeNs t0, TimeNs t1, float from, float to) const {
-    const float level = to + dark_;
-    const float log_next = std::log(level);
-    const float change = log_next - p.log_last;
-    // Log luminance as linear and one time constant are good enough over small changes only.
-    if (!(std::abs(change) < kSmallChange) || t1 >= p.wake) return false;
-    // The span over the time constant, and the inverse, with one division.
-    const double mean = 0.5 * (from + to) + dark_;
-    const double span = 1e-9 * static_cast<double>(t1 - t0) * mean;
-    const double tau = tau_fast_s_ * mean + tau_dim_s_;
-    const double inverse = 1 / (span * tau);
-    const double x = span * span * inverse;
-    if (!(x > kShortest)) return false;
-    // Response of the low pass to a step after the span.
-    const double followed = x > 18     ? 1
-                            : x < 0.05 ? x * (1 - x * (1.0 / 2 - x * (1.0 / 6 - x * (1.0 / 24))))
-                                       : 1 - static_cast<double>(std::exp(static_cast<float>(-x)));
-    const double behind = p.log_last - p.filtered;
-    const double behind_next = behind + (change * tau * tau * inverse - behind) * followed;
-    const double next = log_next - behind_next;
-    if (!(next < p.high && next > p.low)) return false;
+  /// State of one pixel or of eight.
+  template <class V>
+  struct Quiet {
+    V from, to;  ///< cd/m^2
+    V low, high, log_last, filtered;
+  };
+  /// Whether a span triggers no event, for pixels that do not wake in it; sets the state at its end.
+  template <class V>
+  typename LaneTypes<V>::Mask stays_quiet(TimeNs length, Quiet<V>& p) const {
+    const V level = p.to + dark_;
+    if (!band_limited_) return (level < p.high) & (level > p.low);
+    const V log_next = fast_log(level);
+    const V change = log_next - p.log_last;
+    const V mean = 0.5F * (p.from + p.to) + dark_;
+    const V x = static_cast<float>(1e-9 * static_cast<double>(length)) * mean /
+                (static_cast<float>(tau_fast_s_) * mean + static_cast<float>(tau_dim_s_));
+    // Response of the low pass to a step after the span, whose length is x time constants.
+    const V series = x * (1.0F - x * (1.0F / 2 - x * (1.0F / 6 - x * (1.0F / 24))));
+    const V decayed = 1.0F - fast_exp(V(-smaller(x, all<V>(40))));
+    const V followed = select(x < kSeries, series, decayed);
+    const V behind = p.log_last - p.filtered;
+    const V behind_next = behind + (change / x - behind) * followed;
+    const V next = log_next - behind_next;
     // The filtered signal turns where it meets the log luminance.
-    if ((behind < 0) != (behind_next < 0) &&
-        (std::max(p.log_last, log_next) >= p.high || std::min(p.log_last, log_next) <= p.low))
-      return false;
+    const auto turns = (behind < 0.0F) != (behind_next < 0.0F);
+    const auto reaches = (larger(p.log_last, log_next) >= p.high) | (smaller(p.log_last, log_next) <= p.low);
+    // Log luminance as linear and one time constant are good enough over small changes only.
+    const auto quiet = (magnitude(change) < kSmallChange) & (x > kShortest) & (next < p.high) &
+                       (next > p.low) & !(turns & reaches);
     p.filtered = next;
     p.log_last = log_next;
-    return true;
+    return quiet;
   }
   void advance_unfiltered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events);
   void advance_filtered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events);
@@ -120,14 +135,15 @@ class EventPixels {
                    std::vector<SimEvent>& events);
   void fire(std::size_t pixel, TimeNs t, bool on, EventCause cause, std::vector<SimEvent>& events) const;
   void set_reference(Pixel& p, double log_luminance, TimeNs t) const;
-  void set_bounds(Pixel& p, TimeNs t) const;
+  void set_bounds(std::size_t pixel, TimeNs t);
   double hot_rate_hz(std::size_t pixel) const;
   void draw_next_noise(std::size_t pixel, TimeNs t);
   /// Thins the noise process: whether a candidate is an event at this luminance, and of which cause.
   bool accept_noise(std::size_t pixel, double level, EventCause& cause);
 
   static constexpr float kSmallChange = 0.1F;
-  static constexpr double kShortest = 1e-9;  ///< span over time constant
+  static constexpr float kShortest = 1e-9F;  ///< span over time constant
+  static constexpr float kSeries = 0.06F;    ///< below, a series is more precise than an exponential
 
   ImageSize size_;
   EventCameraConfig config_;
@@ -137,6 +153,12 @@ class EventPixels {
   double tau_fast_s_ = 0, tau_dim_s_ = 0;  ///< time constant = fast + dim / luminance
   double leak_per_s_;
   TimeNs refractory_ns_;
+  // No event before `wake` while the luminance with dark current (without a low pass) or the filtered log
+  // luminance (with it) stays between `low` and `high`. In reset they are infinite and `wake` is its end.
+  std::vector<float> low_, high_;
+  std::vector<float> filtered_;  ///< log luminance after the low pass
+  std::vector<float> log_last_;  ///< log luminance before it
+  std::vector<TimeNs> wake_;
   std::vector<Pixel> pixels_;
 };
 

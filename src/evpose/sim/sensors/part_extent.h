@@ -6,10 +6,17 @@
 #include "evpose/camera/camera.h"
 #include "evpose/core/time.h"
 #include "evpose/sim/flight/motion.h"
-#include "evpose/sim/sensors/surface_image.h"
 #include "evpose/sim/world/scene.h"
 
 namespace evpose::sim {
+
+/// Surfaces nearer than this do not raise the bound of the optical flow any further.
+inline constexpr double kNearest_m = 0.02;
+
+/// Pixels [x0, x1) x [y0, y1).
+struct PixelBox {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
 
 /// Bounding box of a moving part in the image, and its fastest optical flow.
 struct PartExtent {

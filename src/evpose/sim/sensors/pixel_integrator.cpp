@@ -8,10 +8,10 @@
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
-#include "evpose/sim/light/luminance_curve.h"
 #include "evpose/sim/light/tile_sampler.h"
+#include "evpose/sim/light/visible_triangles.h"
 #include "evpose/sim/sensors/part_extent.h"
-#include "evpose/sim/sensors/surface_image.h"
+#include "evpose/sim/sensors/step_integrator.h"
 
 namespace evpose::sim {
 namespace {
@@ -29,6 +29,8 @@ struct TileState {
   std::array<Matrix23d, 5> jacobian;     // px per change of the ray
   float nearest = 0;                     // m
   double speed = 0;                      // px/s
+  std::array<TileSamples, 2> samples;    // the last and the one before
+  int last = 0;
   std::vector<SimEvent> events;
   PixelIntegratorCounts counts;
 };
@@ -60,14 +62,16 @@ bool add_part(const PartExtent& part, int number, TilePlan& plan) {
       box.y0 >= tile.y0 + tile.height || box.y1 <= tile.y0)
     return false;
   plan.movers.push_back({number, box.x0, box.y0, box.x1, box.y1});
-  for (int y = 0; y < tile.height; ++y) {
-    for (int x = 0; x < tile.width; ++x) {
-      const int column = tile.x0 + x, row = tile.y0 + y;
-      if (column >= box.x0 && column < box.x1 && row >= box.y0 && row < box.y1)
-        plan.pixel[static_cast<std::size_t>(y) * kTilePx + x] = PixelClass::mixed;
-    }
-  }
   return true;
+}
+
+std::vector<Tile> cut_into_tiles(ImageSize size) {
+  std::vector<Tile> tiles;
+  for (int y = 0; y < size.height; y += kTilePx) {
+    for (int x = 0; x < size.width; x += kTilePx)
+      tiles.push_back({x, y, std::min(kTilePx, size.width - x), std::min(kTilePx, size.height - y)});
+  }
+  return tiles;
 }
 
 }  // namespace
@@ -75,7 +79,15 @@ bool add_part(const PartExtent& part, int number, TilePlan& plan) {
 struct PixelIntegrator::Impl {
   Impl(const PreparedScene& s, const Camera& c, const std::vector<PixelRay>& r, CameraPath p,
        const PixelIntegratorConfig& f, EventPixels& e, ThreadPool& t)
-      : prepared(s), camera(c), rays(r), path(std::move(p)), config(f), pixels(e), pool(t), size(c.size()) {}
+      : prepared(s),
+        camera(c),
+        rays(r),
+        path(std::move(p)),
+        config(f),
+        pixels(e),
+        pool(t),
+        size(c.size()),
+        triangles(s, r, size, cut_into_tiles(size)) {}
 
   const PreparedScene& prepared;
   const Camera& camera;
@@ -86,9 +98,8 @@ struct PixelIntegrator::Impl {
   ThreadPool& pool;
   ImageSize size;
   TimeNs now = 0;
+  VisibleTriangles triangles;  // of the block
   std::vector<TileState> tiles;
-  std::vector<PixelSample> last;  // of every pixel, row by row
-  SurfaceImage before, after;     // at the ends of the block
   PixelIntegratorCounts counts;
 
   SceneView view_at(TimeNs t) const {
@@ -96,45 +107,44 @@ struct PixelIntegrator::Impl {
   }
   std::size_t index(int x, int y) const { return static_cast<std::size_t>(y) * size.width + x; }
 
-  void cut_into_tiles();
-  void trace_surfaces(const Pose& T_map_cam, SurfaceImage& image);
+  void prepare_tiles();
+  void measure_depths(const SceneView& view);
   TimeNs block_end(TimeNs end);
   void make_views(Block& block) const;
   void set_tile_speeds(TimeNs t0, TimeNs t1, const std::vector<float>& nearest_before);
   float glare() const;
-  TilePlan plan_tile(const TileState& tile, const Block& block, int& samples) const;
+  TilePlan plan_tile(std::size_t tile, const Block& block, int& samples) const;
   void sample_first(const SceneView& view, const Block& block);
-  void integrate_tile(TileState& tile, const Block& block);
-  void integrate_curve(TileState& tile, const Block& block, const CurveContext& context,
-                       const LuminanceCurve& curve, std::size_t pixel);
-  void integrate_step(TileState& tile, const Block& block, const TilePlan& plan, const CurveContext& context,
-                      const TileSamples& samples);
-  void collect(std::vector<SimEvent>& events);
+  void integrate_tile(std::size_t tile, TileSampler& sampler, const Block& block);
+  void collect(TimeNs t0, std::vector<SimEvent>& events);
 };
 
-void PixelIntegrator::Impl::cut_into_tiles() {
-  for (int y = 0; y < size.height; y += kTilePx) {
-    for (int x = 0; x < size.width; x += kTilePx) {
-      TileState tile;
-      tile.tile = {x, y, std::min(kTilePx, size.width - x), std::min(kTilePx, size.height - y)};
-      const int right = x + tile.tile.width - 1, low = y + tile.tile.height - 1;
-      const std::array<std::array<int, 2>, 5> probes = {
-          {{x, y}, {right, y}, {x, low}, {right, low}, {(x + right) / 2, (y + low) / 2}}};
-      for (int i = 0; i < 5; ++i) {
-        tile.probe[i] = rays[index(probes[i][0], probes[i][1])].direction().cast<double>();
-        EVPOSE_CHECK(camera.project(tile.probe[i], &tile.jacobian[i]));
-      }
-      tiles.push_back(std::move(tile));
+void PixelIntegrator::Impl::prepare_tiles() {
+  for (const Tile& cut : triangles.tiles()) {
+    TileState& tile = tiles.emplace_back();
+    tile.tile = cut;
+    const int right = cut.x0 + cut.width - 1, low = cut.y0 + cut.height - 1;
+    const std::array<std::array<int, 2>, 5> probes = {{{cut.x0, cut.y0},
+                                                       {right, cut.y0},
+                                                       {cut.x0, low},
+                                                       {right, low},
+                                                       {(cut.x0 + right) / 2, (cut.y0 + low) / 2}}};
+    for (int i = 0; i < 5; ++i) {
+      tile.probe[i] = rays[index(probes[i][0], probes[i][1])].direction().cast<double>();
+      EVPOSE_CHECK(camera.project(tile.probe[i], &tile.jacobian[i]));
     }
   }
 }
 
-void PixelIntegrator::Impl::trace_surfaces(const Pose& T_map_cam, SurfaceImage& image) {
-  image.group.resize(rays.size());
-  image.patch.resize(rays.size());
+// The nearest surface of each tile.
+void PixelIntegrator::Impl::measure_depths(const SceneView& view) {
   pool.for_chunks(tiles.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k)
-      tiles[k].nearest = trace_tile(prepared, rays, size, tiles[k].tile, T_map_cam, image);
+    TileSampler sampler(prepared, rays, size);
+    for (std::size_t k = begin; k < end; ++k) {
+      const TilePlan plan{tiles[k].tile, triangles.of_tile(k), {}};
+      sampler.set_plan(plan);
+      tiles[k].nearest = std::max(sampler.nearest_m(view), static_cast<float>(kNearest_m));
+    }
   });
 }
 
@@ -182,16 +192,19 @@ void PixelIntegrator::Impl::set_tile_speeds(TimeNs t0, TimeNs t1, const std::vec
 
 float PixelIntegrator::Impl::glare() const {
   double sum = 0;
-  for (const PixelSample& sample : last) sum += sample.luminance;
-  return static_cast<float>(config.veiling_glare * sum / static_cast<double>(last.size()));
+  for (const TileState& tile : tiles) {
+    for (int y = 0; y < tile.tile.height; ++y) {
+      const float* row = &tile.samples[tile.last].luminance[static_cast<std::size_t>(y) * kTilePx];
+      for (int x = 0; x < tile.tile.width; ++x) sum += row[x];
+    }
+  }
+  return static_cast<float>(config.veiling_glare * sum / static_cast<double>(rays.size()));
 }
 
-TilePlan PixelIntegrator::Impl::plan_tile(const TileState& tile, const Block& block, int& samples) const {
-  TilePlan out;
-  out.tile = tile.tile;
+TilePlan PixelIntegrator::Impl::plan_tile(std::size_t k, const Block& block, int& samples) const {
+  TilePlan out{tiles[k].tile, triangles.of_tile(k), {}};
   const double length_s = to_seconds(block.t1 - block.t0);
-  double motion_px = tile.speed * length_s;
-  classify_tile(before, after, size, 1 + static_cast<int>(std::ceil(motion_px)), out);
+  double motion_px = tiles[k].speed * length_s;
   for (std::size_t i = 0; i < block.parts.size(); ++i) {
     if (add_part(block.parts[i], static_cast<int>(i), out))
       motion_px = std::max(motion_px, block.parts[i].speed_px_s * length_s);
@@ -202,116 +215,84 @@ TilePlan PixelIntegrator::Impl::plan_tile(const TileState& tile, const Block& bl
   return out;
 }
 
-// Integrates one pixel along its luminance curve.
-void PixelIntegrator::Impl::integrate_curve(TileState& tile, const Block& block, const CurveContext& context,
-                                            const LuminanceCurve& curve, std::size_t pixel) {
-  const TimeNs t0 = context.t0, t1 = context.t1;
-  TimeNs from_t = t0;
-  for (int k = 1; k < curve.knots; ++k) {
-    const TimeNs to_t =
-        k + 1 == curve.knots ? t1 : t0 + static_cast<TimeNs>(curve.time[k] * static_cast<float>(t1 - t0));
-    if (to_t <= from_t) continue;
-    pixels.advance(pixel, from_t, to_t, curve.luminance[k - 1] + block.glare,
-                   curve.luminance[k] + block.glare, tile.events);
-    from_t = to_t;
-  }
-  tile.counts.knots += curve.knots - 2;
-  const double length_ns = static_cast<double>(t1 - t0);
-  for (Exposure* exposure : block.exposures) {
-    const TimeNs open = std::max(t0, exposure->open), close = std::min(t1, exposure->close);
-    if (open >= close) continue;
-    const float seen = curve.integral(static_cast<double>(open - t0) / length_ns,
-                                      static_cast<double>(close - t0) / length_ns);
-    exposure->sum[pixel] += static_cast<float>(to_seconds(t1 - t0)) * seen +
-                            static_cast<float>(to_seconds(close - open)) * block.glare;
-  }
-}
-
-// Integrates every pixel of a tile from its last sample to this one.
-void PixelIntegrator::Impl::integrate_step(TileState& tile, const Block& block, const TilePlan& plan,
-                                           const CurveContext& context, const TileSamples& samples) {
-  for (int y = 0; y < plan.tile.height; ++y) {
-    for (int x = 0; x < plan.tile.width; ++x) {
-      const std::size_t in_tile = static_cast<std::size_t>(y) * kTilePx + x;
-      const std::size_t i = index(plan.tile.x0 + x, plan.tile.y0 + y);
-      const PixelSample& sample = samples[in_tile];
-      const std::size_t first_event = tile.events.size();
-      if (block.exposures.empty() && nearly_equal(last[i], sample)) {
-        pixels.advance(i, context.t0, context.t1, last[i].luminance + block.glare,
-                       sample.luminance + block.glare, tile.events);
-      } else {
-        integrate_curve(tile, block, context, luminance_curve(context, last[i], sample, plan, x, y), i);
-      }
-      const bool outline = sample.outline || last[i].outline, moving = sample.moving || last[i].moving;
-      for (std::size_t e = first_event; e < tile.events.size(); ++e) {
-        SimEvent& event = tile.events[e];
-        event.object = sample.object;
-        event.origin = moving ? EventOrigin::moving : outline ? EventOrigin::edge : EventOrigin::texture;
-      }
-      last[i] = sample;
-    }
-  }
-}
-
-void PixelIntegrator::Impl::integrate_tile(TileState& tile, const Block& block) {
+void PixelIntegrator::Impl::integrate_tile(std::size_t k, TileSampler& sampler, const Block& block) {
+  TileState& tile = tiles[k];
   tile.events.clear();
   tile.counts = {};
   int samples = 1;
-  const TilePlan plan = plan_tile(tile, block, samples);
-  TileSampler sampler(prepared, rays, size);
-  TileSamples current;
+  const TilePlan plan = plan_tile(k, block, samples);
+  sampler.set_plan(plan);
   TimeNs t0 = block.t0;
-  for (int k = 1; k <= samples; ++k) {
-    const int from = (k - 1) * kGrid / samples, to = k * kGrid / samples;
+  for (int n = 1; n <= samples; ++n) {
+    const int from = (n - 1) * kGrid / samples, to = n * kGrid / samples;
     const TimeNs t1 = block.t0 + (block.t1 - block.t0) * to / kGrid;
     if (t1 == t0) continue;
-    sampler.sample(block.views[to], plan, current);
-    const CurveContext context{prepared, sampler, block.views[from], block.views[to], t0, t1};
-    integrate_step(tile, block, plan, context, current);
+    const TileSamples& before = tile.samples[tile.last];
+    tile.last = 1 - tile.last;
+    TileSamples& after = tile.samples[tile.last];
+    sampler.sample(block.views[to], after);
+    tile.counts.samples += static_cast<std::int64_t>(tile.tile.width) * tile.tile.height;
+    tile.counts.border_samples += static_cast<std::int64_t>(after.borders.size());
+    StepIntegrator step{prepared,   sampler, pixels, size,  plan,        {block.views[from], block.views[to]},
+                        t0,         t1,      before, after, block.glare, block.exposures,
+                        tile.events};
+    step.integrate();
+    tile.counts.knots += step.knots;
     t0 = t1;
   }
-  tile.counts.samples += samples * static_cast<std::int64_t>(tile.tile.width) * tile.tile.height;
-  tile.counts.mixed_samples += samples * std::count(plan.pixel.begin(), plan.pixel.end(), PixelClass::mixed);
 }
 
 void PixelIntegrator::Impl::sample_first(const SceneView& view, const Block& block) {
-  last.resize(rays.size());
   pool.for_chunks(tiles.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
+    TileSampler sampler(prepared, rays, size);
     for (std::size_t k = begin; k < end; ++k) {
       int samples = 0;
-      TileSampler sampler(prepared, rays, size);
-      TileSamples seen;
-      const TilePlan plan = plan_tile(tiles[k], block, samples);
-      sampler.sample(view, plan, seen);
-      for (int y = 0; y < plan.tile.height; ++y) {
-        for (int x = 0; x < plan.tile.width; ++x)
-          last[index(plan.tile.x0 + x, plan.tile.y0 + y)] = seen[static_cast<std::size_t>(y) * kTilePx + x];
-      }
+      const TilePlan plan = plan_tile(k, block, samples);
+      sampler.set_plan(plan);
+      sampler.sample(view, tiles[k].samples[0]);
     }
   });
 }
 
 // Appends the events of all tiles, sorted, and adds up their counts.
-void PixelIntegrator::Impl::collect(std::vector<SimEvent>& events) {
-  const std::size_t first = events.size();
+void PixelIntegrator::Impl::collect(TimeNs t0, std::vector<SimEvent>& events) {
   ++counts.blocks;
+  std::size_t count = 0;
   for (const TileState& tile : tiles) {
-    events.insert(events.end(), tile.events.begin(), tile.events.end());
+    count += tile.events.size();
     counts.samples += tile.counts.samples;
-    counts.mixed_samples += tile.counts.mixed_samples;
+    counts.border_samples += tile.counts.border_samples;
     counts.knots += tile.counts.knots;
   }
-  std::sort(events.begin() + static_cast<std::ptrdiff_t>(first), events.end(),
-            [](const SimEvent& a, const SimEvent& b) {
-              return a.t != b.t ? a.t < b.t : a.y != b.y ? a.y < b.y : a.x < b.x;
-            });
+  // Slots of about a dozen events, each sorted by itself.
+  const std::size_t slots = count / 12 + 1, first = events.size();
+  const auto slot_of = [&](const SimEvent& e) {
+    return static_cast<std::size_t>(e.t - t0 - 1) * slots / static_cast<std::size_t>(now - t0);
+  };
+  std::vector<std::size_t> ends(slots + 1, first);
+  for (const TileState& tile : tiles)
+    for (const SimEvent& e : tile.events) ++ends[slot_of(e) + 1];
+  for (std::size_t i = 0; i < slots; ++i) ends[i + 1] += ends[i] - first;
+  events.resize(first + count);
+  for (const TileState& tile : tiles)
+    for (const SimEvent& e : tile.events) events[ends[slot_of(e)]++] = e;
+  pool.for_chunks(slots, 1024, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t from = i == 0 ? first : ends[i - 1];
+      std::sort(events.begin() + static_cast<std::ptrdiff_t>(from),
+                events.begin() + static_cast<std::ptrdiff_t>(ends[i]),
+                [](const SimEvent& a, const SimEvent& b) {
+                  return a.t != b.t ? a.t < b.t : a.y != b.y ? a.y < b.y : a.x < b.x;
+                });
+    }
+  });
 }
 
 PixelIntegrator::PixelIntegrator(const PreparedScene& prepared, const Camera& camera,
                                  const std::vector<PixelRay>& rays, CameraPath path,
                                  const PixelIntegratorConfig& config, EventPixels& pixels, ThreadPool& pool)
     : impl_(std::make_unique<Impl>(prepared, camera, rays, std::move(path), config, pixels, pool)) {
-  impl_->cut_into_tiles();
+  impl_->prepare_tiles();
 }
 
 PixelIntegrator::~PixelIntegrator() = default;
@@ -322,13 +303,19 @@ void PixelIntegrator::start(TimeNs t) {
   Impl& m = *impl_;
   m.now = t;
   const SceneView view = m.view_at(t);
-  m.trace_surfaces(view.T_map_cam, m.before);
-  m.after = m.before;
+  m.triangles.find(view, view, m.pool);
+  m.measure_depths(view);
   const std::vector<Exposure*> none;
   const TimeNs soon = t + kNsPerUs;
   m.sample_first(view, {t, soon, none, 0, {}, part_extents(m.prepared.scene, m.camera, m.path, t, soon)});
   const float glare = m.glare();
-  for (std::size_t i = 0; i < m.last.size(); ++i) m.pixels.start(i, t, m.last[i].luminance + glare);
+  for (const TileState& tile : m.tiles) {
+    for (int y = 0; y < tile.tile.height; ++y) {
+      for (int x = 0; x < tile.tile.width; ++x)
+        m.pixels.start(m.index(tile.tile.x0 + x, tile.tile.y0 + y), t,
+                       tile.samples[0].luminance[static_cast<std::size_t>(y) * kTilePx + x] + glare);
+    }
+  }
 }
 
 TimeNs PixelIntegrator::advance(TimeNs end, const std::vector<Exposure*>& exposures,
@@ -340,14 +327,15 @@ TimeNs PixelIntegrator::advance(TimeNs end, const std::vector<Exposure*>& exposu
   m.make_views(block);
   std::vector<float> nearest_before;
   for (const TileState& tile : m.tiles) nearest_before.push_back(tile.nearest);
-  m.trace_surfaces(block.views[kGrid].T_map_cam, m.after);
+  m.triangles.find(block.views[0], block.views[kGrid], m.pool);
+  m.measure_depths(block.views[kGrid]);
   m.set_tile_speeds(t0, t1, nearest_before);
   m.pool.for_chunks(m.tiles.size(), 4, [&](std::size_t, std::size_t begin, std::size_t stop) {
-    for (std::size_t k = begin; k < stop; ++k) m.integrate_tile(m.tiles[k], block);
+    TileSampler sampler(m.prepared, m.rays, m.size);
+    for (std::size_t k = begin; k < stop; ++k) m.integrate_tile(k, sampler, block);
   });
-  m.collect(events);
-  std::swap(m.before, m.after);
   m.now = t1;
+  m.collect(t0, events);
   return t1;
 }
 

@@ -21,7 +21,7 @@ namespace evpose::sim {
 /// Resolution of the rendered luminance in time.
 struct PixelIntegratorConfig {
   double step_px = 0.5;          ///< optical flow between two samples of a tile
-  double block_px = 5;           ///< optical flow within a block, at whose ends all surfaces are traced
+  double block_px = 5;           ///< optical flow within a block
   double block_s = 0.01;         ///< longest block
   double max_flow_px_s = 20000;  ///< flights with a faster optical flow are refused
   double veiling_glare =
@@ -37,16 +37,15 @@ struct Exposure {
 
 /// Amount of work, for reports.
 struct PixelIntegratorCounts {
-  std::int64_t blocks = 0, samples = 0, mixed_samples = 0, knots = 0;
+  std::int64_t blocks = 0, samples = 0, border_samples = 0, knots = 0;
 };
 
 /// Integrates the luminance of every pixel over time and feeds it to the event pixels and the exposures.
 ///
-/// Time is divided into blocks of a few pixels of optical flow. At their ends rays determine the surface that
-/// each pixel sees. Where that is one surface in a neighbourhood at both ends, the block needs no more rays.
-/// Within a block each tile of the image is sampled at its own rate, half a pixel of flow apart. Between two
-/// samples the luminance curve of a pixel is refined where it changes much: along the line of the edge that
-/// crosses the pixel, or by further samples of the texture.
+/// Time is divided into blocks of a few pixels of optical flow, for which the triangles are found that each
+/// tile of the image may show. Within a block each tile is sampled at its own rate, half a pixel of flow
+/// apart. Between two samples the luminance curve of a pixel is refined where it changes much: along the line
+/// of the edge that crosses the pixel, or by further samples of the texture.
 class PixelIntegrator {
  public:
   /// Keeps references, except for the config. `rays` are those of the camera.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "evpose/sim/world/lanes.h"
 #include "evpose/sim/world/patterns.h"
 
 namespace evpose::sim {
@@ -20,17 +21,30 @@ class Texture {
   /// Mean around (u, v), metres, over the parallelogram spanned by `a` and `b`, metres.
   float mean(float u_m, float v_m, const Eigen::Vector2f& a_m, const Eigen::Vector2f& b_m) const;
 
+  /// The same at eight places, or at one.
+  template <class V>
+  struct Footprint {
+    V u, v, a_u, a_v, b_u, b_v;
+  };
+  template <class V>
+  V mean(const Footprint<V>& at) const;
+
   std::size_t bytes() const;
 
  private:
-  struct Level {
-    int columns, rows;
-    std::vector<std::uint16_t> values;
-  };
-  float sample(const Level& level, float u, float v) const;
+  template <class V>
+  struct Filter;
+  template <class V>
+  Filter<V> filter(const Footprint<V>& at) const;
+  template <class V>
+  V sample(typename LaneTypes<V>::Int level, V u, V v) const;
+  void add_level(int columns, int rows, const std::vector<std::uint16_t>& values);
 
   float width_, height_, texel_;
-  std::vector<Level> levels_;
+  // Each level is stored with its first column and row once more at the end.
+  std::vector<std::uint16_t> values_;
+  std::vector<float> columns_, rows_;         ///< of each level
+  std::vector<std::int32_t> first_, stride_;  ///< of each level, in `values_`
 };
 
 }  // namespace evpose::sim

@@ -6,7 +6,7 @@ import drawing
 import harness
 import tables
 
-FLIGHT_S, LANDING_S = 1.5, 8
+FLIGHT_S, LANDING_S = 5, 8
 # Name, scenario, size of the image, seconds.
 FLIGHTS = [("indoor_spiral_720p", "indoor_spiral", "720p", FLIGHT_S), ("landing_touchdown", "landing", "vga", LANDING_S),
            *((name, name, "vga", FLIGHT_S) for name in ("people", "hdr_window", "turning_3", "landing", "outdoor_spiral",

@@ -12,7 +12,7 @@ import harness
 import tables
 
 LONG = ["room_people", "room_720p"]  # one of the built map's two columns is enough
-SIMULATED, SIMULATED_S = ["indoor_spiral", "outdoor_spiral"], 0.5
+SIMULATED, SIMULATED_S = ["indoor_spiral", "outdoor_spiral"], 5
 # Clouds of one place are told where it was: their own frame's origin.
 REAL = {"hall_lidar_4cm": [], "campus_building_livox": ["--viewpoint", "0,0,0", "--set", "noise=0.015"],
         "street_lidar_scan": ["--viewpoint", "0,0,0"], "room_laser_scan": [], "office_rgbd": ["--viewpoint", "0,0,0"]}

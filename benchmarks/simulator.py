@@ -13,7 +13,7 @@ import harness
 import tables
 
 SEGMENT_M = 0.12
-SECONDS, HOVER_S = 1.5, 30
+SECONDS, HOVER_S = 5, 30
 SPEEDS = ["speed_1", "speed_2", "speed_3"]
 OTHERS = ["turning_1", "turning_2", "turning_3", "aggressive", "slow", "hover"]
 HARD = ["hdr_window", "hdr_lights_off", "hdr_flicker", "fan", "people", "car"]

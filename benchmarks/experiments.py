@@ -11,6 +11,7 @@ FLIGHT_S, LANDING_S = 5, 8
 FLIGHTS = [("indoor_spiral_720p", "indoor_spiral", "720p", FLIGHT_S), ("landing_touchdown", "landing", "vga", LANDING_S),
            *((name, name, "vga", FLIGHT_S) for name in ("people", "hdr_window", "turning_3", "landing", "outdoor_spiral",
                                                         "speed_1", "speed_3"))]
+UNSEEN_SEEDS = 40
 MOVING = {"fan": ("camera.size=vga",), "people": ("camera.size=vga",), "car": tuple(harness.TINY)}
 BAR, BAR_WEAK, BAR_END_MM = "#1f77d0", "#a9c4e2", 4
 
@@ -130,3 +131,11 @@ def make_events(bench):
                                      lambda: bench.run("bench", "events", recording.folder, *settings))
         figures[key] = event_table(texts)
     return bench.write_page("events", figures)
+
+
+def make_unseen(bench):
+    """Seeds from 100 on are for reporting. What is finished stays in SCRATCH, as the program keeps it."""
+    output = bench.scratch / ("unseen-quick" if bench.quick else "unseen")
+    bench.run("bench", "unseen", "--from", 100, "-o", output, "--seeds", *([1, "--quick"] if bench.quick else [UNSEEN_SEEDS]))
+    parts = re.findall(r"<!-- figures: (.*?) -->\n(.*?)<!-- end -->", (output / "README.md").read_text(), re.DOTALL)
+    return bench.write_page("unseen", {key: lines.splitlines() for key, lines in parts})

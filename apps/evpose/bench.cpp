@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The command line of `evpose bench`; the experiments are in src/evpose/bench/experiments.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
+#include <thread>
 
 #include "commands.h"
 #include "evpose/bench/experiments/calibration.h"
@@ -9,6 +11,7 @@
 #include "evpose/bench/experiments/faults.h"
 #include "evpose/bench/experiments/relocalization.h"
 #include "evpose/bench/experiments/residuals.h"
+#include "evpose/bench/experiments/unseen/unseen.h"
 #include "evpose/bench/experiments/update_picture.h"
 #include "evpose/bench/experiments/variants.h"
 
@@ -138,6 +141,37 @@ void add_picture(CLI::App& bench, Run& run) {
   });
 }
 
+void add_unseen(CLI::App& bench, Run& run) {
+  auto* command =
+      bench.add_subcommand("unseen",
+                           "Places, flights and sensors drawn from seeds, tracked with true contours, a "
+                           "built map and a handed-over "
+                           "calibration. Seeds 0 to 99 are for development, those from 100 on for reporting");
+  auto request = std::make_shared<experiments::UnseenRequest>();
+  request->threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  command->add_option("--seeds", request->seeds, "number of seeds")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--from", request->from, "first of them")
+      ->check(CLI::Range(0, 100000000))
+      ->capture_default_str();
+  command->add_option("--minutes", request->minutes, "after which no seed is begun; the same command goes on")
+      ->check(CLI::Range(0.0, 1e6));
+  command->add_option("-o,--output", request->output, "folder of the page and the results")
+      ->capture_default_str();
+  auto* keep = command->add_option("--keep", request->flights,
+                                   "folder in which flights stay, and are taken from if they are there");
+  command->add_flag("--rebuild-maps", request->rebuild_maps, "build the maps of kept flights anew")
+      ->needs(keep);
+  command->add_option("--compare", request->compare, "results.jsonl of another run: differences by seed");
+  command->add_flag("--quick", request->quick, "320x240, 1 s and small clouds: to see that it works");
+  command->add_option("--threads", request->threads, "seeds at a time; the result is the same for any number")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  add_settings(*command, request->assignments);
+  command->callback([=, &run] { run = [=] { return exit_status(experiments::run_unseen(*request)); }; });
+}
+
 }  // namespace
 
 void add_bench(CLI::App& app, std::function<int()>& run) {
@@ -152,6 +186,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_faults(*bench, run);
   add_residuals(*bench, run);
   add_picture(*bench, run);
+  add_unseen(*bench, run);
 }
 
 }  // namespace evpose

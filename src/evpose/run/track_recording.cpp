@@ -60,39 +60,6 @@ Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request
   return std::make_shared<const ContourMap>(std::move(*map));
 }
 
-/// Reads both streams side by side; the IMU runs ahead so that no event has to wait for it.
-Status feed(const Recording& recording, const RunConfig& config, Tracker& tracker, Progress& progress) {
-  auto reader = open_events(recording, 1e-3 * config.packet_ms);
-  if (!reader) return reader.error();
-  std::unique_ptr<ImuReader> imu;
-  if (recording.has_imu) {
-    auto opened = open_imu(recording);
-    if (!opened) return opened.error();
-    imu = std::make_unique<ImuReader>(std::move(*opened));
-  }
-  std::unique_ptr<PacketQueue> ahead;
-  if (config.tracker.threads > 1) ahead = std::make_unique<PacketQueue>(**reader);
-  EventPacket packet;
-  ImuSample sample;
-  TimeNs imu_until = std::numeric_limits<TimeNs>::min();
-  while (true) {
-    const auto more = ahead ? ahead->next(packet) : (*reader)->next(packet);
-    if (!more) return more.error();
-    if (!*more) return {};
-    const TimeNs end = packet.time(packet.events.back());
-    while (imu && imu_until <= end) {
-      const auto another = imu->next(sample);
-      if (!another) return another.error();
-      if (!*another) break;
-      tracker.add_imu(sample);
-      imu_until = sample.t;
-    }
-    tracker.add_events(packet);
-    progress.at(to_seconds(end - recording.first_ns) /
-                std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns)));
-  }
-}
-
 /// Draws the map over the time surface at even intervals of the run, for the report.
 class OverlayWriter {
  public:
@@ -222,6 +189,40 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
   return summary;
 }
 
+Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
+                      const std::function<void(double)>& progress) {
+  auto reader = open_events(recording, 1e-3 * config.packet_ms);
+  if (!reader) return reader.error();
+  std::unique_ptr<ImuReader> imu;
+  if (recording.has_imu) {
+    auto opened = open_imu(recording);
+    if (!opened) return opened.error();
+    imu = std::make_unique<ImuReader>(std::move(*opened));
+  }
+  std::unique_ptr<PacketQueue> ahead;
+  if (config.tracker.threads > 1) ahead = std::make_unique<PacketQueue>(**reader);
+  EventPacket packet;
+  ImuSample sample;
+  TimeNs imu_until = std::numeric_limits<TimeNs>::min();
+  while (true) {
+    const auto more = ahead ? ahead->next(packet) : (*reader)->next(packet);
+    if (!more) return more.error();
+    if (!*more) return {};
+    const TimeNs end = packet.time(packet.events.back());
+    while (imu && imu_until <= end) {
+      const auto another = imu->next(sample);
+      if (!another) return another.error();
+      if (!*another) break;
+      tracker.add_imu(sample);
+      imu_until = sample.t;
+    }
+    tracker.add_events(packet);
+    if (progress)
+      progress(to_seconds(end - recording.first_ns) /
+               std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns)));
+  }
+}
+
 Expected<RunOutcome> track_recording(const TrackRequest& request) {
   const auto asked = load_config(request);
   if (!asked) return asked.error();
@@ -245,7 +246,9 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
 
   const double wall_start = wall_s(), cpu_start = cpu_s();
   Progress progress("tracking");
-  if (auto ok = feed(job->recording, config, **tracker, progress); !ok) return ok.error();
+  if (auto ok = feed_recording(job->recording, config, **tracker, [&](double share) { progress.at(share); });
+      !ok)
+    return ok.error();
   progress.done();
   if (updates == 0)
     return Error{request.recording, "the streams end before the first update",

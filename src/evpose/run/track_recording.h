@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,6 +54,10 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
                             std::vector<TimedPose> truth);
 /// Reads and checks everything but the events.
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
+/// Gives the tracker both streams of the recording, the IMU ahead so that no event has to wait for it.
+/// `progress`, if any, is told the share of the recording, 0..1.
+Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
+                      const std::function<void(double)>& progress);
 /// What the run folder is told at the end; without times and memory.
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker);
 

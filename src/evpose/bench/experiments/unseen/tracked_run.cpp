@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/bench/experiments/unseen/tracked_run.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "evpose/bench/experiments/streams.h"
+#include "evpose/eval/score.h"
+#include "evpose/report/overlay.h"
+#include "evpose/report/series.h"
+
+namespace evpose::experiments::unseen {
+namespace {
+
+constexpr std::size_t kCoursePoints = 400;     // of the picture of a run
+constexpr TimeNs kLookEvery = 250 * kNsPerMs;  // for the moment that is drawn
+constexpr double kDecay_s = 0.02;              // of the events in that picture
+
+bool is_far(const ErrorSample& sample, const Matrix6d& covariance) {
+  const Eigen::LLT<Matrix6d> factor(covariance);
+  if (factor.info() != Eigen::Success) return true;
+  const Vector6d d = sample.truth.minus(sample.estimate);
+  return !(factor.matrixL().solve(d).squaredNorm() <= kFarSquared);
+}
+
+ErrorCourse course_of(const std::vector<ErrorSample>& samples, const std::vector<TrackedPose>& poses,
+                      TimeNs start) {
+  ErrorCourse out;
+  for (const std::size_t i : evenly_spaced_indices(samples.size(), kCoursePoints)) {
+    const ErrorSample& s = samples[i];
+    out.t_s.push_back(rounded(to_seconds(s.t - start), 6));
+    out.position_mm.push_back(rounded(s.ate_mm(), 4));
+    out.rotation_deg.push_back(rounded(s.are_deg(), 4));
+    out.sigma_mm.push_back(rounded(1e3 * s.sigma.head<3>().norm(), 4));
+    out.tracking.push_back(poses[s.index].health == Health::tracking);
+  }
+  return out;
+}
+
+/// Keeps the picture of the largest error among moments at equal distances.
+class WorstMoment {
+ public:
+  WorstMoment(const std::vector<TimedPose>& truth, TimeNs from) : truth_(truth), next_(from) {}
+
+  void look(const Tracker& tracker, const Update& u) {
+    if (u.t < next_ || u.t >= truth_.back().t) return;
+    next_ += kLookEvery;
+    const double error_m = (u.T_map_body.p - start_at(truth_, u.t).T_map_body.p).norm();
+    if (snapshot_ && !(error_m > error_m_)) return;
+    error_m_ = error_m;
+    snapshot_ = tracker.snapshot(kDecay_s);
+  }
+
+  std::optional<RgbImage> picture() const {
+    if (!snapshot_) return std::nullopt;
+    std::vector<OverlayPoint> points;
+    for (const auto& p : snapshot_->points) points.push_back({p.x, p.y, p.matched});
+    return draw_overlay(snapshot_->size.width, snapshot_->size.height, snapshot_->decay, points);
+  }
+
+ private:
+  const std::vector<TimedPose>& truth_;
+  TimeNs next_;
+  double error_m_ = 0;
+  std::optional<Snapshot> snapshot_;
+};
+
+TrackRequest request_of(const Flight& flight, Given given) {
+  TrackRequest request;
+  request.recording = flight.folder;
+  request.init = "groundtruth";
+  request.map = given == Given::built_map ? flight.map_path() : flight.contours_path();
+  if (given != Given::built_map) request.occluders = flight.mesh_path();
+  if (given != Given::handed_over) request.calibration = flight.true_calibration_path();
+  return request;
+}
+
+TrackedRun without_figures(const std::string& fault) {
+  TrackedRun out;
+  out.judgement.figures.fault = fault;
+  return out;
+}
+
+}  // namespace
+
+Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPose>& truth, TimeNs from) {
+  Judgement judged;
+  RunFigures& out = judged.figures;
+  std::vector<TimedPose> estimate;
+  std::vector<Matrix6d> covariances;
+  for (const TrackedPose& p : poses) {
+    estimate.push_back(p.pose);
+    covariances.push_back(p.covariance);
+  }
+  ScoreOptions options;
+  options.from = from;
+  const TrajectoryScore score = score_trajectory({estimate, truth, covariances, {}, {}}, options);
+  const double nees6 = score.nees6_mean.value_or(NAN);
+  if (score.pairs < 2 || !std::isfinite(score.ate_mm.mean + score.are_deg.mean + nees6)) {
+    out.fault = score.pairs < 2 ? "ends before it is judged" : "not finite";
+    return judged;
+  }
+  out.ate_mm = score.ate_mm.mean;
+  out.ate_max_mm = score.ate_mm.max;
+  out.are_deg = score.are_deg.mean;
+  out.nees6 = nees6;
+  out.poses = static_cast<int>(score.pairs);
+  int tracking = 0;
+  for (const ErrorSample& s : score.samples) {
+    if (poses[s.index].health != Health::tracking) continue;
+    ++tracking;
+    if (is_far(s, poses[s.index].covariance)) ++out.silent;
+  }
+  out.tracking = static_cast<double>(tracking) / out.poses;
+  out.at_end = to_string(poses.back().health);
+  judged.course = course_of(score.samples, poses, truth.front().t);
+  return judged;
+}
+
+Expected<TrackedRun> track_flight(const Flight& flight, Given given, const RunConfig& config) {
+  if (given == Given::built_map && !flight.map_fault.empty()) return without_figures(flight.map_fault);
+  const auto job = prepare(request_of(flight, given), config);
+  if (!job) return job.error();
+  const auto tracker = Tracker::create(job->setup, job->config.tracker, job->start);
+  if (!tracker) return without_figures(tracker.error().what);
+  const TimeNs judged = job->start.t + from_seconds(kJudgedAfter_s);
+  WorstMoment moment(job->truth, judged);
+  std::vector<TrackedPose> poses;
+  (*tracker)->keep_time_surface(true);
+  (*tracker)->on_update([&](const Update& u) {
+    poses.push_back({{u.t, u.T_map_body}, u.covariance, u.health});
+    moment.look(**tracker, u);
+  });
+  if (Status done = feed_recording(job->recording, job->config, **tracker, {}); !done) return done.error();
+  return TrackedRun{judge(poses, job->truth, judged), moment.picture()};
+}
+
+}  // namespace evpose::experiments::unseen

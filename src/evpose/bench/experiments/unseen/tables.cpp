@@ -112,10 +112,16 @@ Summary summarise(const std::vector<SeedResult>& results, Given given) {
   Summary out;
   std::vector<double> ate_mm, are_deg, nees6;
   double tracking = 0;
+  int tracked = 0;
   out.least_tracking = 1;
   for (const SeedResult& result : results) {
     const RunFigures& r = result.run(given);
     ++out.seeds;
+    if (r.poses > 0) {
+      ++tracked;
+      tracking += r.tracking;
+      out.least_tracking = std::min(out.least_tracking, r.tracking);
+    }
     if (!r.fault.empty()) {
       ++out.without_figures;
       continue;
@@ -123,15 +129,13 @@ Summary summarise(const std::vector<SeedResult>& results, Given given) {
     ate_mm.push_back(r.ate_mm);
     are_deg.push_back(r.are_deg);
     nees6.push_back(r.nees6);
-    tracking += r.tracking;
-    out.least_tracking = std::min(out.least_tracking, r.tracking);
     out.honest += r.nees6 >= kHonestLow && r.nees6 <= kHonestHigh ? 1 : 0;
     out.poses += r.poses;
     out.silent_poses += r.silent;
     out.silent_seeds += r.silent > 0 ? 1 : 0;
   }
-  if (ate_mm.empty()) out.least_tracking = 0;
-  out.tracking = tracking / std::max<double>(1, static_cast<double>(ate_mm.size()));
+  if (tracked == 0) out.least_tracking = 0;
+  out.tracking = tracking / std::max(1, tracked);
   out.ate_mm = distribution(std::move(ate_mm));
   out.are_deg = distribution(std::move(are_deg));
   out.nees6 = distribution(std::move(nees6));
@@ -156,7 +160,7 @@ std::string summary_table(const std::vector<SeedResult>& results) {
          row("of all poses, silently wrong", all,
              [](const Summary& s) { return format("%d of %d", s.silent_poses, s.poses); }) +
          row("seeds with such", all, [](const Summary& s) { return format("%d", s.silent_seeds); }) +
-         row("seeds without figures", all,
+         row("seeds lost throughout, or without a map", all,
              [](const Summary& s) { return format("%d of %d", s.without_figures, s.seeds); });
 }
 

@@ -16,7 +16,7 @@ struct Distribution {
 /// Of values of which large ones are bad. All zero for none.
 Distribution distribution(std::vector<double> values);
 
-/// All seeds with one kind of input; runs without figures count as such and for nothing else.
+/// All seeds with one kind of input; runs without figures count as such and for the share of `tracking` only.
 struct Summary {
   int seeds = 0, without_figures = 0;
   Distribution ate_mm, are_deg, nees6;

@@ -2,6 +2,7 @@
 #include "evpose/bench/experiments/unseen/tracked_run.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "evpose/bench/experiments/streams.h"
@@ -12,9 +13,10 @@
 namespace evpose::experiments::unseen {
 namespace {
 
-constexpr std::size_t kCoursePoints = 400;     // of the picture of a run
-constexpr TimeNs kLookEvery = 250 * kNsPerMs;  // for the moment that is drawn
-constexpr double kDecay_s = 0.02;              // of the events in that picture
+constexpr std::size_t kCoursePoints = 400;               // of the picture of a run
+constexpr TimeNs kLookEvery = 250 * kNsPerMs;            // for the moment that is drawn
+constexpr double kShown = 0.15;                          // events in that picture per pixel, about
+constexpr double kShortest_s = 1e-3, kLongest_s = 0.02;  // in which they came
 
 bool is_far(const ErrorSample& sample, const Matrix6d& covariance) {
   const Eigen::LLT<Matrix6d> factor(covariance);
@@ -40,7 +42,8 @@ ErrorCourse course_of(const std::vector<ErrorSample>& samples, const std::vector
 /// Keeps the picture of the largest error among moments at equal distances.
 class WorstMoment {
  public:
-  WorstMoment(const std::vector<TimedPose>& truth, TimeNs from) : truth_(truth), next_(from) {}
+  WorstMoment(const std::vector<TimedPose>& truth, TimeNs from, double decay_s)
+      : truth_(truth), next_(from), decay_s_(decay_s) {}
 
   void look(const Tracker& tracker, const Update& u) {
     if (u.t < next_ || u.t >= truth_.back().t) return;
@@ -48,7 +51,7 @@ class WorstMoment {
     const double error_m = (u.T_map_body.p - start_at(truth_, u.t).T_map_body.p).norm();
     if (snapshot_ && !(error_m > error_m_)) return;
     error_m_ = error_m;
-    snapshot_ = tracker.snapshot(kDecay_s);
+    snapshot_ = tracker.snapshot(decay_s_);
   }
 
   std::optional<RgbImage> picture() const {
@@ -61,7 +64,7 @@ class WorstMoment {
  private:
   const std::vector<TimedPose>& truth_;
   TimeNs next_;
-  double error_m_ = 0;
+  double decay_s_, error_m_ = 0;
   std::optional<Snapshot> snapshot_;
 };
 
@@ -86,34 +89,34 @@ TrackedRun without_figures(const std::string& fault) {
 Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPose>& truth, TimeNs from) {
   Judgement judged;
   RunFigures& out = judged.figures;
+  std::vector<TrackedPose> stood_by;
   std::vector<TimedPose> estimate;
   std::vector<Matrix6d> covariances;
+  int tracking = 0;
   for (const TrackedPose& p : poses) {
+    if (p.pose.t < from) continue;
+    ++out.poses;
+    tracking += p.health == Health::tracking ? 1 : 0;
+    if (p.health == Health::waiting || p.health == Health::lost) continue;
+    stood_by.push_back(p);
     estimate.push_back(p.pose);
     covariances.push_back(p.covariance);
   }
-  ScoreOptions options;
-  options.from = from;
-  const TrajectoryScore score = score_trajectory({estimate, truth, covariances, {}, {}}, options);
+  out.tracking = static_cast<double>(tracking) / std::max(1, out.poses);
+  const TrajectoryScore score = score_trajectory({estimate, truth, covariances, {}, {}}, {});
   const double nees6 = score.nees6_mean.value_or(NAN);
   if (score.pairs < 2 || !std::isfinite(score.ate_mm.mean + score.are_deg.mean + nees6)) {
-    out.fault = score.pairs < 2 ? "ends before it is judged" : "not finite";
+    out.fault = score.pairs < 2 ? "lost" : "not finite";
     return judged;
   }
   out.ate_mm = score.ate_mm.mean;
   out.ate_max_mm = score.ate_mm.max;
   out.are_deg = score.are_deg.mean;
   out.nees6 = nees6;
-  out.poses = static_cast<int>(score.pairs);
-  int tracking = 0;
-  for (const ErrorSample& s : score.samples) {
-    if (poses[s.index].health != Health::tracking) continue;
-    ++tracking;
-    if (is_far(s, poses[s.index].covariance)) ++out.silent;
-  }
-  out.tracking = static_cast<double>(tracking) / out.poses;
+  for (const ErrorSample& s : score.samples)
+    if (stood_by[s.index].health == Health::tracking && is_far(s, stood_by[s.index].covariance)) ++out.silent;
   out.at_end = to_string(poses.back().health);
-  judged.course = course_of(score.samples, poses, truth.front().t);
+  judged.course = course_of(score.samples, stood_by, truth.front().t);
   return judged;
 }
 
@@ -124,7 +127,9 @@ Expected<TrackedRun> track_flight(const Flight& flight, Given given, const RunCo
   const auto tracker = Tracker::create(job->setup, job->config.tracker, job->start);
   if (!tracker) return without_figures(tracker.error().what);
   const TimeNs judged = job->start.t + from_seconds(kJudgedAfter_s);
-  WorstMoment moment(job->truth, judged);
+  const ImageSize size = job->setup.camera->size();
+  const double decay_s = kShown * size.width * size.height / (1e6 * std::max(flight.mev_s, 1e-6));
+  WorstMoment moment(job->truth, judged, std::clamp(decay_s, kShortest_s, kLongest_s));
   std::vector<TrackedPose> poses;
   (*tracker)->keep_time_surface(true);
   (*tracker)->on_update([&](const Update& u) {

@@ -35,7 +35,8 @@ struct Judgement {
   RunFigures figures;
   ErrorCourse course;
 };
-/// The poses from `from` on against the truth.
+/// The poses from `from` on against the truth. Those that the tracker calls lost (or waiting) are no poses
+/// that it stands by: they count for the share of `tracking` only.
 Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPose>& truth, TimeNs from);
 
 struct TrackedRun {

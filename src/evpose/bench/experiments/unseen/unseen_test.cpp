@@ -178,9 +178,20 @@ TEST(UnseenJudgement, CountsWhatIsCalledTracking) {
   const Judgement judged = judge(poses, truth, 0);
   EXPECT_NEAR(judged.figures.tracking, 51.0 / 101, 1e-12);
   EXPECT_EQ(judged.figures.at_end, "lost");
-  ASSERT_EQ(judged.course.tracking.size(), 101U);
-  EXPECT_TRUE(judged.course.tracking[50]);
-  EXPECT_FALSE(judged.course.tracking[51]);
+}
+
+TEST(UnseenJudgement, ErrorsAreThoseOfPosesThatItStandsBy) {
+  const std::vector<TimedPose> truth = straight_truth();
+  std::vector<TrackedPose> poses = wrong_poses(truth, 1, Health::degraded);
+  for (std::size_t i = 51; i < 101; ++i) poses[i] = {poses[i].pose, poses[i].covariance, Health::lost};
+  for (std::size_t i = 51; i < 101; ++i) poses[i].pose.pose.p.z() = 100;
+  const Judgement judged = judge(poses, truth, 0);
+  EXPECT_NEAR(judged.figures.ate_max_mm, 1, 1e-9);
+  EXPECT_EQ(judged.figures.poses, 101);
+  EXPECT_EQ(judged.figures.tracking, 0);
+  ASSERT_EQ(judged.course.tracking.size(), 51U);
+  EXPECT_FALSE(judged.course.tracking[0]);
+  EXPECT_EQ(judge(wrong_poses(truth, 1, Health::lost), truth, 0).figures.fault, "lost");
 }
 
 TEST(UnseenJudgement, WithoutPosesOrNumbersThereAreNoFigures) {
@@ -223,7 +234,9 @@ TEST(UnseenTables, ASummaryCountsSeedsAndPoses) {
                                   result_of(3, 4, 2.1), result_of(4, 99)};
   results[1].runs[0].silent = 7;
   results[2].runs[0].tracking = 0.5;
-  results[4].runs[0].fault = "no map";
+  results[4].runs[0] = {};
+  results[4].runs[0].fault = "lost";
+  results[4].runs[0].poses = 100;
   const Summary s = summarise(results, Given::truth);
   EXPECT_EQ(s.seeds, 5);
   EXPECT_EQ(s.without_figures, 1);
@@ -233,8 +246,8 @@ TEST(UnseenTables, ASummaryCountsSeedsAndPoses) {
   EXPECT_EQ(s.poses, 400);
   EXPECT_EQ(s.silent_poses, 7);
   EXPECT_EQ(s.silent_seeds, 1);
-  EXPECT_EQ(s.tracking, 0.875);
-  EXPECT_EQ(s.least_tracking, 0.5);
+  EXPECT_EQ(s.tracking, 0.7);
+  EXPECT_EQ(s.least_tracking, 0);
 }
 
 TEST(UnseenTables, ClassesHaveTheirOwnMeans) {

@@ -6,6 +6,7 @@
 
 #include "evpose/sim/world/facade.h"
 #include "evpose/sim/world/furniture.h"
+#include "evpose/sim/world/printed_things.h"
 
 namespace evpose::sim {
 namespace {
@@ -44,7 +45,11 @@ class Yard {
     Mesh& mesh = d_.scene.mesh;
     const Face face{V(-kHalfX, -kHalfY, 0), V(2 * kHalfX, 0, 0), V(0, 2 * kHalfY, 0)};
     add_face(mesh, face, d_.finish(m_.grounds[static_cast<std::size_t>(kind)], ground));
-    add_box_on(mesh, V(0, 0, 0), {kPad, kPad, kPadTop}, 0, d_.finish(m_.concrete, pad), kOnGround);
+    if (d_.config.pad_mark == PadMark::none)
+      add_box_on(mesh, V(0, 0, 0), {kPad, kPad, kPadTop}, 0, d_.finish(m_.concrete, pad), kOnGround);
+    else
+      add_landing_pad(mesh, Pose(), {kPad, kPadTop, d_.config.pad_mark}, d_.finish(m_.concrete, pad),
+                      d_.finish(m_.pole, pad));
     // Patches of other ground in the four quarters, apart from each other.
     for (int i = 0; i < 4; ++i) {
       const double sx = i & 1 ? 1 : -1, sy = i & 2 ? 1 : -1;
@@ -67,6 +72,15 @@ class Yard {
       f.window_width = d_.random.uniform(0.9, 1.25);
       f.window_height = d_.random.uniform(1.3, 1.6);
       f.wall = m_.walls[static_cast<std::size_t>(d_.pick(0, static_cast<int>(m_.walls.size()) - 1))];
+      if (d_.config.repeated_facades) {
+        f.height = 7.5;
+        f.bay = 2;
+        f.storey = 3;
+        f.window_width = 1.1;
+        f.window_height = 1.5;
+        f.wall = m_.walls[0];
+        f.repeats = true;
+      }
       const double yaw = -side * kQuarter;  // faces inwards
       const V foot = so3::exp(V(0, 0, yaw)) * V(0, along_x ? kHalfY : kHalfX, 0);
       put_facade(d_, m_, Placement(foot, yaw), f);

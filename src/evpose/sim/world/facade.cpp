@@ -21,7 +21,7 @@ std::vector<Bay> bays(WorldBuilder& d, const Facade& f) {
   const int columns = std::max(1, static_cast<int>(f.width / f.bay)),
             storeys = std::max(1, static_cast<int>(f.height / f.storey));
   const double first = 0.5 * (f.width - columns * f.bay);
-  const int door = d.pick(0, columns - 1);
+  const int door = f.repeats ? 0 : d.pick(0, columns - 1);
   for (int j = 0; j < storeys; ++j) {
     for (int i = 0; i < columns; ++i) {
       const double middle = first + (i + 0.5) * f.bay, low = j * f.storey + f.sill;
@@ -29,7 +29,7 @@ std::vector<Bay> bays(WorldBuilder& d, const Facade& f) {
         all.push_back({{middle - 0.6, middle + 0.6, 0.04, 2.3}, true, false});
         continue;
       }
-      if (d.chance(0.06)) continue;  // bricked up
+      if (!f.repeats && d.chance(0.06)) continue;  // bricked up
       const bool balcony = j > 0 && d.chance(f.balconies);
       all.push_back({{middle - 0.5 * f.window_width, middle + 0.5 * f.window_width, low,
                       std::min(low + f.window_height, f.height - 0.3)},
@@ -41,24 +41,27 @@ std::vector<Bay> bays(WorldBuilder& d, const Facade& f) {
 }
 
 void put_window(WorldBuilder& d, const OutdoorMaterials& m, const Placement& place, const Opening& o,
-                std::int32_t object) {
+                std::int32_t object, bool repeats) {
+  const auto finish = [&](std::int32_t material) {
+    return repeats ? Finish{material, object, {0, 0}} : d.finish(material, object);
+  };
   const double back = kReveal, front = kReveal - kBar, middle = 0.5 * (o.u0 + o.u1),
                cross = o.v0 + 0.62 * (o.v1 - o.v0);
-  const Finish bars = d.finish(m.frame, object);
+  const Finish bars = finish(m.frame);
   add_face(d.scene.mesh,
            {place.T_map_object * V(o.u0, back, o.v0), place.T_map_object.q * V(o.u1 - o.u0, 0, 0),
             place.T_map_object.q * V(0, 0, o.v1 - o.v0)},
-           d.finish(m.glass, object));
+           finish(m.glass));
   put_box(d, place, V(middle - 0.5 * kBar, front, o.v0), V(middle + 0.5 * kBar, back, o.v1), bars,
           side_west | side_east | side_south);
   for (const auto& [u0, u1] : {std::pair{o.u0, middle - 0.5 * kBar}, std::pair{middle + 0.5 * kBar, o.u1}})
     put_box(d, place, V(u0, front, cross - 0.5 * kBar), V(u1, back, cross + 0.5 * kBar), bars,
             side_south | side_below | side_above);
-  put_box(d, place, V(o.u0 - 0.08, -0.09, o.v0 - 0.08), V(o.u1 + 0.08, 0, o.v0 - 0.015),
-          d.finish(m.ledge, object), kOnWall);
-  if (d.chance(0.6))  // lintel
-    put_box(d, place, V(o.u0 - 0.1, -0.05, o.v1 + 0.02), V(o.u1 + 0.1, 0, o.v1 + 0.2),
-            d.finish(m.ledge, object), kOnWall);
+  put_box(d, place, V(o.u0 - 0.08, -0.09, o.v0 - 0.08), V(o.u1 + 0.08, 0, o.v0 - 0.015), finish(m.ledge),
+          kOnWall);
+  if (repeats || d.chance(0.6))  // lintel
+    put_box(d, place, V(o.u0 - 0.1, -0.05, o.v1 + 0.02), V(o.u1 + 0.1, 0, o.v1 + 0.2), finish(m.ledge),
+            kOnWall);
 }
 
 void put_balcony(WorldBuilder& d, const OutdoorMaterials& m, const Placement& place, const Opening& o,
@@ -135,7 +138,7 @@ void put_facade(WorldBuilder& d, const OutdoorMaterials& m, const Placement& pla
       put_box(d, corner, V(o.u0 - 0.2, -0.4, 0), V(o.u1 + 0.2, 0, 0.12), d.finish(m.concrete, door),
               kOnWall & ~static_cast<unsigned>(side_below));
     } else {
-      put_window(d, m, corner, bay.opening, object);
+      put_window(d, m, corner, bay.opening, object, f.repeats);
     }
     if (bay.balcony) put_balcony(d, m, corner, bay.opening, object);
   }

@@ -21,6 +21,7 @@ struct Facade {
   double window_width = 1.1, window_height = 1.5, sill = 0.95;
   double balconies = 0;  ///< fraction of the windows above the ground floor that have one
   std::int32_t wall = 0;
+  bool repeats = false;  ///< all windows alike, none bricked up, the door on the left
 };
 /// A facade that faces -y of the placement, which is the middle of its lower edge: windows with panes, bars
 /// and sills, doors, ledges between the storeys, a cornice.

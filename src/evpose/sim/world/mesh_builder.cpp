@@ -195,6 +195,19 @@ void add_cylinder(Mesh& mesh, const Pose& T_part_axis, const Cylinder& c, const 
   if (c.lid_above && c.radius_above > 0) lid(true);
 }
 
+void add_ring(Mesh& mesh, const Pose& T_part_ring, const Ring& ring, const Finish& finish) {
+  const auto corner = [&](int i, double radius) {
+    const double angle = 2 * std::numbers::pi * (i % ring.facets) / ring.facets;
+    const Eigen::Vector3d p(radius * std::cos(angle), radius * std::sin(angle), 0);
+    return Corner{T_part_ring * p, T_part_ring.q * Eigen::Vector3d::UnitZ(), p.head<2>()};
+  };
+  for (int i = 0; i < ring.facets; ++i)
+    add_quad(
+        mesh,
+        {corner(i, ring.inner), corner(i, ring.outer), corner(i + 1, ring.outer), corner(i + 1, ring.inner)},
+        finish);
+}
+
 void add_wall(Mesh& mesh, const Face& face, const std::vector<Opening>& openings, double reveal_m,
               const Finish& finish, const Finish& reveal) {
   const Frame frame(face);

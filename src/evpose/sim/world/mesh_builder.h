@@ -55,6 +55,13 @@ struct Cylinder {
 };
 void add_cylinder(Mesh& mesh, const Pose& T_part_axis, const Cylinder& cylinder, const Finish& finish);
 
+/// A flat ring in the plane z = 0 of `T_part_ring` that faces +z; its texture lies in x and y.
+struct Ring {
+  double inner, outer;  // radii, metres
+  int facets;
+};
+void add_ring(Mesh& mesh, const Pose& T_part_ring, const Ring& ring, const Finish& finish);
+
 /// A rectangle left out of a wall: metres along the wall's u and v.
 struct Opening {
   double u0, u1, v0, v1;

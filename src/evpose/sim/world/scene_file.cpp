@@ -2,6 +2,7 @@
 #include "evpose/sim/world/scene_file.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -13,6 +14,7 @@
 #include "evpose/core/parallel.h"
 #include "evpose/sim/world/closed_path.h"
 #include "evpose/sim/world/mesh_file.h"
+#include "evpose/sim/world/printed_things.h"
 #include "evpose/sim/world/scene_fields.h"
 #include "evpose/sim/world/world_builder.h"
 
@@ -165,29 +167,33 @@ class SceneReader {
     return -1;
   }
 
-  Finish finish(SceneFields& f, std::int32_t object) {
+  // The material that a member names.
+  std::int32_t material(SceneFields& f, const std::string& key) const {
+    const std::string name = f.needed_string(key);
+    const auto found = materials_.find(name);
+    if (found != materials_.end()) return found->second;
+    if (f.failed()) return 0;
+    std::vector<std::string> names;
+    for (const auto& known : materials_) names.push_back(known.first);
+    const std::string nearest = nearest_word(name, names);
+    f.fail(f.node(), key + ": '" + name + "' is unknown",
+           nearest.empty() ? "list it under `materials`" : "did you mean '" + nearest + "'?");
+    return 0;
+  }
+  Finish finish(SceneFields& f, std::int32_t object) const {
     Finish out{0, object, {0, 0}};
     const Eigen::Vector2d uv = f.pair("uv_m", {0, 0}, {-kLongest_m, kLongest_m});
     out.uv = uv;
     out.along_grain = f.boolean("along_grain", false);
-    const std::string name = f.needed_string("material");
-    const auto found = materials_.find(name);
-    if (found != materials_.end()) {
-      out.material = found->second;
-    } else if (!f.failed()) {
-      std::vector<std::string> names;
-      for (const auto& material : materials_) names.push_back(material.first);
-      const std::string nearest = nearest_word(name, names);
-      f.fail(f.node(), "material: '" + name + "' is unknown",
-             nearest.empty() ? "list it under `materials`" : "did you mean '" + nearest + "'?");
-    }
+    out.material = material(f, "material");
     return out;
   }
 
-  // A body in its own frame, as `box`, `cylinder`, `quad` or `mesh` describes it. Bodies stand on z = 0.
+  // A body in its own frame, as one of its keys describes it. Bodies stand on z = 0.
   Expected<Mesh> read_body(SceneFields& f, const Finish& covering) const {
     Mesh mesh;
-    const std::string kind = f.needed_one_of({"box", "cylinder", "quad", "mesh"});
+    const std::string kind =
+        f.needed_one_of({"box", "cylinder", "quad", "mesh", "landing_pad", "checkerboard"});
     const YamlNode* const node = f.member(kind);
     if (node == nullptr) return f.finish().error();
     if (kind == "mesh") return read_mesh_file(*node, covering);
@@ -205,6 +211,8 @@ class SceneReader {
       c.height = shape.needed_number("height", {0.001, kLongest_m});
       c.facets = static_cast<int>(shape.number("facets", 40, {6, 1000}));
       if (!shape.failed()) add_cylinder(mesh, {}, c, covering);
+    } else if (kind == "landing_pad" || kind == "checkerboard") {
+      read_printed(shape, kind, covering, mesh);
     } else {
       const Face face{shape.vector("corner", {0, 0, 0}), shape.needed_vector("u"), shape.needed_vector("v")};
       if (face.u.cross(face.v).norm() < 1e-6)
@@ -213,6 +221,34 @@ class SceneReader {
     }
     if (auto status = shape.finish(); !status) return status.error();
     return mesh;
+  }
+  void read_printed(SceneFields& shape, const std::string& kind, const Finish& covering, Mesh& mesh) const {
+    Finish ink = covering;
+    ink.material = material(shape, "ink");
+    if (kind == "landing_pad") {
+      LandingPad pad;
+      pad.size = shape.number("size_m", pad.size, {0.05, 100});
+      pad.height = shape.number("height_m", pad.height, {0, 100});
+      const std::string mark = shape.string("mark", "h");
+      const auto marks = pad_marks();
+      const auto found =
+          std::find_if(marks.begin(), marks.end(), [&](const auto& m) { return m.first == mark; });
+      if (found == marks.end())
+        shape.fail(shape.node(), "mark: '" + mark + "' is unknown", "take none, h, ring or squares");
+      else
+        pad.mark = found->second;
+      if (!shape.failed()) add_landing_pad(mesh, {}, pad, covering, ink);
+      return;
+    }
+    Checkerboard board;
+    board.columns = static_cast<int>(shape.number("columns", board.columns, {2, 100}));
+    board.rows = static_cast<int>(shape.number("rows", board.rows, {2, 100}));
+    board.square_m = shape.number("square_m", board.square_m, {0.001, 10});
+    board.margin_m = shape.number("margin_m", board.margin_m, {0, 10});
+    board.middle_m = shape.number("middle_m", board.middle_m, {0.01, 100});
+    if (board.middle_m < 0.5 * board.rows * board.square_m + board.margin_m)
+      shape.fail(shape.node(), "middle_m: the board reaches below its foot", "raise it");
+    if (!shape.failed()) add_checkerboard(mesh, {}, board, covering, ink);
   }
   Expected<Mesh> read_mesh_file(const YamlNode& node, const Finish& covering) const {
     SceneFields f(document_, node, "mesh");
@@ -232,6 +268,7 @@ class SceneReader {
   Status read_object(const YamlNode& node) {
     SceneFields f(document_, node, "object");
     const std::int32_t object = builder_.add_object(f.string("name", "object"));
+    if (f.boolean("furniture", false)) builder_.scene.furniture.push_back(object);
     const Pose T_map_body = f.pose();
     const auto body = read_body(f, finish(f, object));
     if (auto status = f.finish(); !status) return status;

@@ -74,6 +74,28 @@ moving:
     EXPECT_NE(std::find(scene->objects.begin(), scene->objects.end(), name), scene->objects.end()) << name;
 }
 
+TEST(SceneFile, PrintedThingsAndFurnitureAreRead) {
+  const TemporaryFolder folder;
+  const std::string things = std::string(kSmall) + R"(
+  - {name: pad, at: [0, 3, 0], landing_pad: {size_m: 2, height_m: 0, mark: squares, ink: grey}, material: wood}
+  - {name: board, at: [0, -3, 0], checkerboard: {columns: 8, rows: 6, square_m: 0.1, ink: grey}, material: wood}
+  - {name: stool, furniture: true, at: [0, 1, 0], box: {size: [0.4, 0.4, 0.5]}, material: wood}
+)";
+  const auto scene = read(folder, things);
+  ASSERT_TRUE(scene.ok()) << error_line(scene);
+  EXPECT_EQ(scene->furniture, std::vector<std::int32_t>{4});
+  EXPECT_EQ(std::count(scene->mesh.object.begin(), scene->mesh.object.end(), 2), 2 * 81);
+  const auto line = [&](const std::string& from, const std::string& to) {
+    std::string text = things;
+    return error_line(read(folder, text.replace(text.find(from), from.size(), to)));
+  };
+  EXPECT_EQ(line("mark: squares", "mark: cross"),
+            folder / "scene.yaml" + ":13: mark: 'cross' is unknown; take none, h, ring or squares");
+  EXPECT_EQ(line(", ink: grey", ""), folder / "scene.yaml" + ":13: landing_pad: 'ink' is missing; add it");
+  EXPECT_EQ(line("square_m: 0.1", "square_m: 1"),
+            folder / "scene.yaml" + ":14: middle_m: the board reaches below its foot; raise it");
+}
+
 TEST(SceneFile, AddsToABuiltInWorld) {
   const TemporaryFolder folder;
   const auto scene = read(folder, R"(
@@ -133,7 +155,7 @@ TEST(SceneFile, FaultsAreToldInOneLine) {
        ":11: size: 2 numbers instead of 3; correct the list");
   says("[1, 2, 3]", "[1, 2, -3]", ":11: size: each must be between 0.001 and 1000 m; correct it");
   says("box: {size: [1, 2, 3]}", "ball: 3",
-       ":11: object: none of box, cylinder, quad, mesh is there; add one");
+       ":11: object: none of box, cylinder, quad, mesh, landing_pad, checkerboard is there; add one");
   says("v: [0, 10, 0]", "v: [1, 0, 0]", ":10: quad: u and v span no area; give two directions");
   says("lux: 500", "lux: nan", ":8: lux: 'nan' is not a finite number; give a number");
   says("kind: ambient", "kind: neon", ":8: kind: 'neon' is no kind of light; take lamp, sun or ambient");

@@ -71,6 +71,17 @@ class Street {
     }
   }
 
+  Facade repeated_house() const {
+    Facade f;
+    f.width = 12;
+    f.height = 12;
+    f.bay = 2.4;
+    f.storey = 3;
+    f.wall = m_.walls[0];
+    f.repeats = true;
+    return f;
+  }
+
   void add_buildings(double side) {
     for (double x = -12; x < kLength + 10;) {
       Facade f;
@@ -82,14 +93,19 @@ class Street {
       f.window_height = d_.random.uniform(1.3, 1.8);
       f.balconies = d_.chance(0.4) ? 0.4 : 0;
       f.wall = m_.walls[static_cast<std::size_t>(d_.pick(0, static_cast<int>(m_.walls.size()) - 1))];
-      const double front = kFront + d_.random.uniform(0, 0.7), deep = 9;
+      double front = kFront + d_.random.uniform(0, 0.7);
+      const double deep = 9;
+      if (d_.config.repeated_facades) {
+        f = repeated_house();
+        front = kFront;
+      }
       put_facade(d_, m_, facing_road(x + 0.5 * f.width, front, kPavement, side), f);
       // The house behind its facade: sides and roof.
       const double y0 = side > 0 ? front : -front - deep, y1 = side > 0 ? front + deep : -front;
       add_box_between(d_.scene.mesh, V(x, y0, kPavement), V(x + f.width, y1, f.height + kPavement),
                       d_.finish(f.wall, d_.add_object("house")), side_west | side_east | side_above);
-      shop(side, x, f.width, front);
-      x += f.width + (d_.chance(0.12) ? d_.random.uniform(3, 5) : 0.0);
+      if (!f.repeats) shop(side, x, f.width, front);
+      x += f.width + (!f.repeats && d_.chance(0.12) ? d_.random.uniform(3, 5) : 0.0);
     }
   }
 
@@ -147,6 +163,7 @@ class Street {
     Facade f;
     f.width = 28;
     f.height = 14;
+    f.repeats = d_.config.repeated_facades;
     f.wall = m_.walls[1];
     put_facade(d_, m_, Placement(V(kLength + 25, 0, 0), -0.5 * kHalfTurn), f);
     f.wall = m_.walls[0];

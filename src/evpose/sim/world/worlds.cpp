@@ -24,6 +24,8 @@ void describe(ConfigTable& table, WorldConfig& c) {
   table.add("sun_elevation_deg", c.sun_elevation_deg, "deg", "elevation of the sun", {1, 90});
   table.add("sky_lux", c.sky_lux, "lux", "outside: sky, on open ground", {0, 1e5});
   table.add("night", c.night, "no sun, hardly a sky; street lamps are on");
+  table.add("repeated_facades", c.repeated_facades, "outside: facades whose windows are all alike");
+  table.add("pad_mark", c.pad_mark, pad_marks(), "courtyard: on the landing platform");
   table.group("movers", c.movers);
 }
 

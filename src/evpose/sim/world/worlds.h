@@ -5,6 +5,7 @@
 
 #include "evpose/core/error.h"
 #include "evpose/sim/world/movers.h"
+#include "evpose/sim/world/printed_things.h"
 #include "evpose/sim/world/scene.h"
 
 namespace evpose {
@@ -30,8 +31,10 @@ struct WorldConfig {
   double sun_lux = 60000;        ///< outside, facing it
   double sun_azimuth_deg = 215;  ///< from +x to +y
   double sun_elevation_deg = 48;
-  double sky_lux = 15000;  ///< outside, on open ground
-  bool night = false;      ///< no sun, hardly a sky, street lamps on
+  double sky_lux = 15000;            ///< outside, on open ground
+  bool night = false;                ///< no sun, hardly a sky, street lamps on
+  bool repeated_facades = false;     ///< outside: facades whose windows are all alike
+  PadMark pad_mark = PadMark::none;  ///< courtyard: on the landing platform
   MoversConfig movers;
 };
 void describe(ConfigTable& table, WorldConfig& config);

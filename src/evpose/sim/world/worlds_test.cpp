@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
@@ -91,6 +94,32 @@ TEST(Worlds, MaterialsReflectPlausibly) {
   }
   EXPECT_GT(textured, 20u);
   EXPECT_LT(bytes, 300u << 20);
+}
+
+TEST(Worlds, RepeatedFacadesHaveAllWindowsAlike) {
+  for (const WorldKind kind : {WorldKind::courtyard, WorldKind::canyon}) {
+    WorldConfig config;
+    config.kind = kind;
+    config.repeated_facades = true;
+    WorldBuilder builder(config);
+    ASSERT_TRUE(build_world(builder).ok());
+    // Window panes are as large as their opening; all have one size and one place on the texture.
+    std::map<std::array<long, 4>, int> panes;
+    const Scene& scene = builder.scene;
+    ThreadPool pool(1);
+    std::set<std::int32_t> glass;
+    const auto materials = builder.materials.build(1, pool);
+    for (std::size_t i = 0; i < materials.size(); ++i)
+      if (materials[i].name == "window panes") glass.insert(static_cast<std::int32_t>(i));
+    for (std::size_t i = 0; i < scene.mesh.triangles.size(); i += 2) {
+      if (!glass.contains(scene.mesh.material[i])) continue;
+      const auto& uv = scene.mesh.uv[i];
+      const auto mm = [](float m) { return std::lround(1e3 * static_cast<double>(m)); };
+      ++panes[{mm(uv[0].x()), mm(uv[0].y()), mm(uv[1].x()), mm(uv[2].y())}];
+    }
+    ASSERT_EQ(panes.size(), 1u);
+    EXPECT_GT(panes.begin()->second, 60);
+  }
 }
 
 TEST(Worlds, RefuseCarsInTheHall) {

@@ -79,14 +79,16 @@ int simulate(const SimulateRequest& request) {
   const auto& origin = made->by_origin;
   const double signal = std::max(1.0, static_cast<double>(cause[0]));
   std::printf(
-      "%s: %.2f s, %.3f million events (%.2f Mev/s), %lld late, %lld lost in read-out\n"
+      "%s: %.2f s, %.3f million events (%.2f Mev/s), %lld late, %lld lost in read-out, %lld filtered, %lld "
+      "shed\n"
       "  signal %.1f %% (texture %.1f, edges %.1f, moving things %.1f %% of it), leak %.1f %%, shot noise "
       "%.1f %%, "
       "hot pixels %.1f %%\n"
       "  %zu contour points, %d pictures; %.1f s of work, %.1f s per simulated second, %d threads\n",
       request.output.c_str(), made->duration_s, mega(made->read_out.delivered),
       mega(made->read_out.delivered) / made->duration_s, static_cast<long long>(made->read_out.late),
-      static_cast<long long>(made->read_out.lost),
+      static_cast<long long>(made->read_out.lost), static_cast<long long>(made->read_out.trailing),
+      static_cast<long long>(made->read_out.shed),
       100 * signal / std::max(1.0, static_cast<double>(made->read_out.delivered)),
       100 * static_cast<double>(origin[0]) / signal, 100 * static_cast<double>(origin[1]) / signal,
       100 * static_cast<double>(origin[2]) / signal,

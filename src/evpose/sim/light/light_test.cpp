@@ -145,5 +145,45 @@ TEST(SceneView, PlainWallHasOneLuminanceFromEverywhere) {
   }
 }
 
+// A floor with a clear coat before a wall whose upper half is bright.
+TEST(SceneView, ACoatMirrorsBySchlicksLawWhatTheMirroredRayMeets) {
+  constexpr double kCoat = 0.04, kFloor = 0.2, kLow = 0.1, kHigh = 0.8;
+  TestScene test;
+  test.add({-1, -5, 0}, {6, 0, 0}, {0, 10, 0}, kFloor);
+  test.scene.materials.back().mirror = kCoat;
+  test.add({4, 5, 0}, {0, -10, 0}, {0, 0, 1}, kLow);
+  test.add({4, 5, 1}, {0, -10, 0}, {0, 0, 1}, kHigh);
+  ThreadPool pool(1);
+  const PreparedScene prepared(test.scene, pool);
+  constexpr double kEye_m = 1.2;
+  const SceneView view = make_scene_view(prepared, 0, looking_along_x({0, 0, kEye_m}));
+  const auto lit = [&](double x, double y, double z, int patch) {  // seen point: its own luminance
+    const PixelRay ray{
+        {static_cast<float>(-y / x), static_cast<float>((kEye_m - z) / x)}, {1e-4F, 0}, {0, 1e-4F}};
+    return static_cast<double>(
+        luminance(prepared, view, make_patch_view(view, prepared.still.patches[patch], -1), ray));
+  };
+  const auto patch_at = [&](double x, double y, double z) {
+    const auto hit = prepared.rays.trace({0, 0, kEye_m}, Eigen::Vector3d(x, y, z - kEye_m));
+    return prepared.still.patch_of[hit->triangle];
+  };
+  for (const double x : {0.5, 1.0, 1.7, 2.0, 2.3, 3.0, 3.5}) {
+    for (const double y : {-0.7, 0.0, 0.4}) {
+      const int floor = patch_at(x, y, 0);
+      // The mirrored ray rises as steeply as the direct one falls.
+      const double up = kEye_m / x * (4 - x);
+      const double across = y / x * 4;
+      const double cosine = kEye_m / std::sqrt(kEye_m * kEye_m + x * x + y * y);
+      const double coat = kCoat + (1 - kCoat) * std::pow(1 - cosine, 5);
+      const double mirrored = up > 2 ? 0 : lit(4, across, up, patch_at(4, across, up));
+      if (std::abs(up - 1) < 0.01 || std::abs(up - 2) < 0.01) continue;
+      test.scene.materials[0].mirror = 0;
+      const double matt = lit(x, y, 0, floor);
+      test.scene.materials[0].mirror = kCoat;
+      EXPECT_NEAR(lit(x, y, 0, floor), (1 - coat) * matt + coat * mirrored, 2e-4) << x << " " << y;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace evpose::sim

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "evpose/sim/world/texture.h"
 
@@ -89,8 +90,13 @@ SceneView interpolate_view(const SceneView& a, const SceneView& b, double fracti
 }
 
 PatchView make_patch_view(const SceneView& view, const Patch& patch, int part) {
-  const Eigen::Vector3d origin = part < 0 ? view.T_map_cam.p : view.T_part_cam[part].p;
-  const Eigen::Matrix3d R = (part < 0 ? view.R_map_cam : view.T_part_cam[part].rotation()).transpose();
+  if (part < 0) return make_patch_view(view.T_map_cam.p, view.R_map_cam, patch, part);
+  return make_patch_view(view.T_part_cam[part].p, view.T_part_cam[part].rotation(), patch, part);
+}
+
+PatchView make_patch_view(const Eigen::Vector3d& origin, const Eigen::Matrix3d& R_part_frame,
+                          const Patch& patch, int part) {
+  const Eigen::Matrix3d R = R_part_frame.transpose();
   PatchView out;
   out.patch = &patch;
   out.part = part;
@@ -109,9 +115,12 @@ PatchView make_patch_view(const SceneView& view, const Patch& patch, int part) {
   return out;
 }
 
+namespace {
+
+// Without the coat.
 template <class V>
-V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
-            const RayAreas<V>& r) {
+V matt_luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+                 const RayAreas<V>& r) {
   const auto along = [&r](const Eigen::Vector3f& axis) {
     return V(axis.x() * r.x + axis.y() * r.y + axis.z());
   };
@@ -140,6 +149,60 @@ V luminance(const PreparedScene& prepared, const SceneView& view, const PatchVie
     emission *= view.light[prepared.channels.of_light[material.emission_light]];
   return reflectance * lux * std::numbers::inv_pi_v<float> + emission;
 }
+
+// What the coat of a static patch mirrors: the scene as seen from behind the mirror, along the same ray.
+float mirrored_luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& mirror,
+                         const RayAreas<float>& r) {
+  constexpr float kSkipped_m = 2e-3F;  // prints on the mirror do not mirror themselves
+  const Eigen::Vector3d& n = mirror.patch->normal;
+  const Eigen::Vector3d origin = view.T_map_cam.p - 2 * (n.dot(view.T_map_cam.p) + mirror.patch->offset) * n;
+  const Eigen::Matrix3d R = view.R_map_cam - 2 * n * (n.transpose() * view.R_map_cam);
+  float sum = 0;
+  for (const auto& [a, b] : {std::pair{-0.25F, -0.25F}, {0.25F, -0.25F}, {-0.25F, 0.25F}, {0.25F, 0.25F}}) {
+    const RayAreas<float> quarter{r.x + a * r.column_x + b * r.row_x,
+                                  r.y + a * r.column_y + b * r.row_y,
+                                  0.5F * r.column_x,
+                                  0.5F * r.column_y,
+                                  0.5F * r.row_x,
+                                  0.5F * r.row_y};
+    const Eigen::Vector3f ray(quarter.x, quarter.y, 1);
+    const float depth = std::max(0.0F, mirror.reach / mirror.normal.dot(ray));
+    const auto hit = prepared.rays.trace(origin, R * ray.cast<double>(), depth + kSkipped_m);
+    sum +=
+        hit ? matt_luminance(prepared, view, make_patch_view(origin, R, prepared.patch_of(*hit), -1), quarter)
+            : static_cast<float>(prepared.scene.sky_cd_m2);
+  }
+  return 0.25F * sum;
+}
+
+// Adds what a clear coat mirrors, by Schlick's law of the angle (1994).
+float coated(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+             const RayAreas<float>& r, float matt) {
+  const auto normal = static_cast<float>(prepared.scene.materials[patch.patch->material].mirror);
+  const Eigen::Vector3f ray(r.x, r.y, 1);
+  const float rest = 1 - std::min(1.0F, std::abs(patch.normal.dot(ray)) / ray.norm()), square = rest * rest;
+  const float mirrored = normal + (1 - normal) * square * square * rest;
+  return (1 - mirrored) * matt + mirrored * mirrored_luminance(prepared, view, patch, r);
+}
+FloatLanes coated(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+                  const RayAreas<FloatLanes>& r, FloatLanes matt) {
+  for (int i = 0; i < kLanes; ++i)
+    matt[i] = coated(prepared, view, patch,
+                     RayAreas<float>{r.x[i], r.y[i], r.column_x[i], r.column_y[i], r.row_x[i], r.row_y[i]},
+                     matt[i]);
+  return matt;
+}
+
+}  // namespace
+
+template <class V>
+V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
+            const RayAreas<V>& areas) {
+  const V matt = matt_luminance(prepared, view, patch, areas);
+  if (!(prepared.scene.materials[patch.patch->material].mirror > 0) || patch.part >= 0) return matt;
+  return coated(prepared, view, patch, areas, matt);
+}
+
 template float luminance(const PreparedScene&, const SceneView&, const PatchView&, const RayAreas<float>&);
 template FloatLanes luminance(const PreparedScene&, const SceneView&, const PatchView&,
                               const RayAreas<FloatLanes>&);

@@ -32,6 +32,9 @@ struct PatchView {
   float reach = 0, u = 0, v = 0, right0 = 0, up0 = 0;
 };
 PatchView make_patch_view(const SceneView& view, const Patch& patch, int part);
+/// From any frame at `origin` in the part's frame; R_part_frame may be a reflection.
+PatchView make_patch_view(const Eigen::Vector3d& origin, const Eigen::Matrix3d& R_part_frame,
+                          const Patch& patch, int part);
 
 /// Directions (x, y, 1) and the areas around them, spanned by their change by column and row; of one pixel or
 /// of eight.
@@ -39,7 +42,7 @@ template <class V>
 struct RayAreas {
   V x, y, column_x, column_y, row_x, row_y;
 };
-/// Mean luminance over each area, cd/m^2.
+/// Mean luminance over each area, cd/m^2. A clear coat mirrors what stands still.
 template <class V>
 V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
             const RayAreas<V>& areas);

@@ -105,6 +105,39 @@ TEST_F(MakeRecording, IsARecordingThatTheTrackerReads) {
   EXPECT_LT(recording->T_cam_body.minus(expected).norm(), 1e-9);
 }
 
+TEST_F(MakeRecording, HandsOverErrorsAndKeepsTheTruthApart) {
+  ASSERT_TRUE(make("true").ok());
+  scenario_.handed_over.preset = CalibrationQuality::ordinary;
+  ASSERT_TRUE(make("wrong").ok());
+  auto exact = content(place("true")), wrong = content(place("wrong"));
+  EXPECT_FALSE(exact.contains("camchain-imucam_truth.yaml"));
+  EXPECT_TRUE(wrong.contains("handed_over.yaml"));
+  EXPECT_EQ(wrong.at("camchain-imucam_truth.yaml"), exact.at("camchain-imucam.yaml"));
+  EXPECT_NE(wrong.at("camchain-imucam.yaml"), exact.at("camchain-imucam.yaml"));
+  for (const char* name :
+       {"events.h5", "imu.csv", "groundtruth.tum", "groundtruth_camera.tum", "contours.ply"})
+    EXPECT_EQ(wrong.at(name), exact.at(name)) << name;
+  const auto recording = open_recording(place("wrong"));
+  ASSERT_TRUE(recording.ok()) << recording.error().line();
+  const CalibrationErrors errors =
+      draw_calibration_errors(scenario_.handed_over, static_cast<std::uint64_t>(scenario_.seed));
+  EXPECT_NEAR(recording->camera.fx, 40 * (1 + errors.focal), 1e-9);
+}
+
+TEST_F(MakeRecording, EventsFollowTheSensorsPreset) {
+  scenario_.events.preset = EventSensorPreset::dvxplorer;
+  const auto made = make("it");
+  ASSERT_TRUE(made.ok()) << made.error().line();
+  const auto& n = made->read_out;
+  EXPECT_GT(n.delivered, 300);
+  EXPECT_GT(n.late, n.delivered / 2);  // frames of 0.2 ms
+  EXPECT_EQ(n.in, n.delivered + n.lost + n.trailing + n.shed);
+  scenario_.events.threshold_on = 0.01;
+  const auto refused = make("refused");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().line().find("events.threshold_on"), std::string::npos);
+}
+
 TEST_F(MakeRecording, ReplacesItsOwnAndNothingElse) {
   ASSERT_TRUE(make("it").ok());
   ASSERT_TRUE(make("it").ok());

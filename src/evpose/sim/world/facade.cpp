@@ -107,6 +107,7 @@ OutdoorMaterials add_outdoor_materials(WorldBuilder& d, double texel_m) {
                                          container_side({4, 2.4}, d.seed()));
   m.glass =
       d.materials.add_textured("window panes", 0.9, {4, 4}, 0.006, window_panes({4, 4}, 0.55, d.seed()));
+  d.materials.set_mirror(m.glass, d.config.mirror);
   m.door = d.materials.add_textured("doors", tone(0.4, 0.8), small, 0.004, planks(small, 0.14, d.seed()));
   m.frame = d.materials.add_with_tone("window frames", tone(1.0, 1.5), m.concrete);
   m.ledge = d.materials.add_with_tone("ledges", tone(1.0, 1.4), m.concrete);

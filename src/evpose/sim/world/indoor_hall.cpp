@@ -41,6 +41,7 @@ Hall add_materials(WorldBuilder& d) {
                                                      planks(wall, 0.16, d.seed()))
                           : d.materials.add_textured("floor tiles", tone(0.7, 1), wall, kTexel_m,
                                                      tiles(wall, 0.3, d.seed()));
+  d.materials.set_mirror(h.floor, d.config.mirror);
   h.ceiling = d.materials.add_textured("ceiling", 1.2, {3, 3}, kTexel_m, ceiling_panels({3, 3}, d.seed()));
   h.pillar = d.materials.add_textured("marble", tone(0.9, 1.2), {2, 3}, kTexel_m, marble({2, 3}, d.seed()));
   h.carpet =

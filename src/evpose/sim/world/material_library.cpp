@@ -31,6 +31,10 @@ void MaterialLibrary::set_emission(std::int32_t material, double cd_m2, int ligh
   own.emission_light = light;
 }
 
+void MaterialLibrary::set_mirror(std::int32_t material, double reflectance) {
+  materials_[static_cast<std::size_t>(material)].mirror = reflectance;
+}
+
 std::int32_t MaterialLibrary::add_textured(const std::string& name, double tone, const Repeat& repeat,
                                            double texel_m, Pattern pattern) {
   const std::int32_t material = add_plain(name, tone);

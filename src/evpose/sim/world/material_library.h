@@ -25,6 +25,8 @@ class MaterialLibrary {
                             Pattern pattern);
   /// Adds emission; `light` as in Material::emission_light.
   void set_emission(std::int32_t material, double cd_m2, int light);
+  /// A clear coat; as Material::mirror.
+  void set_mirror(std::int32_t material, double reflectance);
   /// The same texture in another tone.
   std::int32_t add_with_tone(const std::string& name, double tone, std::int32_t of);
 

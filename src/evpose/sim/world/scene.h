@@ -15,13 +15,14 @@ namespace evpose::sim {
 
 class Texture;
 
-/// Optical properties of a surface: Lambertian reflectance and own emission.
+/// Optical properties of a surface: Lambertian reflectance, own emission, a smooth clear coat.
 struct Material {
   std::string name;
   double reflectance = 0.5;                ///< 0 to 1; a factor of the texture where there is one
   std::shared_ptr<const Texture> texture;  ///< none: plain
   double emission_cd_m2 = 0;               ///< emitted luminance: sky, lamp, window pane
   int emission_light = -1;                 ///< light whose switching and flicker it follows; -1: constant
+  double mirror = 0;  ///< reflectance of the coat at normal incidence (polish, varnish, glass: 0.04); 0: matt
 };
 
 /// Triangles in the frame of their part, metres. Both sides are seen.

@@ -154,6 +154,7 @@ class SceneReader {
     } else {
       material = builder_.materials.add_plain(name, f.number("reflectance", 0.5, {0, 1}));
     }
+    builder_.materials.set_mirror(material, f.number("mirror", 0, {0, 1}));
     if (glow > 0) builder_.materials.set_emission(material, glow, light_number(f, node, light));
     if (materials_.count(name) != 0) f.fail(node, "material: '" + name + "' stands here twice", "rename one");
     materials_[name] = material;

@@ -25,6 +25,10 @@ void describe(ConfigTable& table, WorldConfig& c) {
   table.add("sky_lux", c.sky_lux, "lux", "outside: sky, on open ground", {0, 1e5});
   table.add("night", c.night, "no sun, hardly a sky; street lamps are on");
   table.add("repeated_facades", c.repeated_facades, "outside: facades whose windows are all alike");
+  table.add(
+      "mirror", c.mirror, "",
+      "reflectance of the hall's floor, outside of window panes, at normal incidence; 0: matt, glass: 0.04",
+      {0, 1});
   table.add("pad_mark", c.pad_mark, pad_marks(), "courtyard: on the landing platform");
   table.group("movers", c.movers);
 }

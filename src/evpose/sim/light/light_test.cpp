@@ -110,6 +110,28 @@ TEST(Lighting, LampFollowsTheSquareOfDistanceAndThrowsShadows) {
   EXPECT_NEAR(at(0.2, 0) / (100 / 4.04 * 2 / std::sqrt(4.04)), 0.5, 0.2);
 }
 
+// Contact shadow: a floor at the foot of a long wall sees 1/2 (1 + d / sqrt(d^2 + h^2)) of an even sky.
+TEST(Lighting, AmbientLightFallsTowardsAContactByTheViewOfTheSky) {
+  constexpr double kHeight = 0.5, kFloor = 0.6;
+  TestScene test;
+  test.add({0, -3, 0}, {2, 0, 0}, {0, 6, 0}, kFloor);
+  test.add({2, 3, 0}, {0, -6, 0}, {0, 0, kHeight}, 0.4);
+  ThreadPool pool(1);
+  const PreparedScene prepared(test.scene, pool);
+  const SceneView view = make_scene_view(prepared, 0, looking_along_x({0, 0, 1}));
+  double last = 0;
+  for (const double d : {0.01, 0.03, 0.06, 0.1, 0.2, 0.4, 0.8}) {
+    const double x = 2 - d;
+    const PixelRay ray{{0, static_cast<float>(1 / x)}, {1e-4F, 0}, {0, 1e-4F}};
+    const double seen = static_cast<double>(luminance(
+                            prepared, view, make_patch_view(view, prepared.still.patches[0], -1), ray)) /
+                        kFloor;
+    EXPECT_NEAR(seen, 0.5 * (1 + d / std::hypot(d, kHeight)), 0.06) << d;  // 24 rays
+    EXPECT_GE(seen, last - 1e-6);
+    last = seen;
+  }
+}
+
 TEST(Lighting, SwitchingIsAFactorOfTime) {
   LightSwitching s;
   EXPECT_EQ(s.factor(3), 1);

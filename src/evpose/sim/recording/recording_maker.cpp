@@ -193,11 +193,12 @@ Status RecordingMaker::write_map(const Scene& scene, const RayCaster& rays) {
 Status RecordingMaker::expose(const PreparedScene& prepared, const Camera& camera,
                               const std::vector<PixelRay>& rays, const CameraPath& path) {
   const TimeNs end = from_seconds(counts_.duration_s);
+  const std::vector<float> gain = lens_gain(scenario_.camera);
   auto sink = EventSink::create(folder_, camera.size(), scenario_.truth.events, prepared.scene);
   if (!sink) return sink.error();
-  auto frames = FrameCamera::create(folder_, camera.size(), scenario_.frames, end);
+  auto frames = FrameCamera::create(folder_, gain, camera.size(), scenario_.frames, end);
   if (!frames) return frames.error();
-  EventPixels pixels(camera.size(), scenario_.events, static_cast<std::uint64_t>(scenario_.seed));
+  EventPixels pixels(camera.size(), scenario_.events, static_cast<std::uint64_t>(scenario_.seed), gain);
   ReadOut read_out(camera.size(), scenario_.read_out, static_cast<std::uint64_t>(scenario_.seed));
   PixelIntegrator integrator(prepared, camera, rays, path, scenario_.integrator, pixels, pool_);
   integrator.start(0);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/sim/sensors/camera_rig.h"
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "evpose/core/config.h"
@@ -32,6 +34,24 @@ CameraIntrinsics intrinsics(const CameraConfig& c) {
           size};
 }
 
+std::vector<float> lens_gain(const CameraConfig& config) {
+  const CameraIntrinsics c = intrinsics(config);
+  double farthest = 0;
+  for (const double x : {0.0, c.size.width - 1.0})
+    for (const double y : {0.0, c.size.height - 1.0})
+      farthest = std::max(farthest, std::hypot(x - c.cx, (y - c.cy) * c.fx / c.fy));
+  // (1 + k r^2)^-2, with r = 1 in that corner.
+  const double k = 1 / std::sqrt(1 - config.vignetting) - 1;
+  std::vector<float> gain;
+  gain.reserve(static_cast<std::size_t>(c.size.width) * c.size.height);
+  for (int y = 0; y < c.size.height; ++y)
+    for (int x = 0; x < c.size.width; ++x) {
+      const double r = std::hypot(x - c.cx, (y - c.cy) * c.fx / c.fy) / farthest;
+      gain.push_back(static_cast<float>(std::pow(1 + k * r * r, -2)));
+    }
+  return gain;
+}
+
 Pose T_body_cam(const CameraConfig& c) {
   constexpr double kDegree = std::numbers::pi / 180;
   Eigen::Matrix3d R_forward_cam;  // z forward, x right
@@ -59,6 +79,8 @@ void describe(ConfigTable& table, CameraConfig& c) {
   table.add("pitch_down_deg", c.pitch_down_deg, "deg", "of the optical axis, from straight ahead", {-90, 90});
   table.add("yaw_left_deg", c.yaw_left_deg, "deg", "of the optical axis, from straight ahead", {-180, 180});
   table.add("roll_deg", c.roll_deg, "deg", "about the optical axis", {-180, 180});
+  table.add("vignetting", c.vignetting, "", "fraction of the light that the farthest corner lacks",
+            {0, 0.95});
   table.add("forward_m", c.forward_m, "m", "of the lens from the IMU", {-10, 10});
   table.add("left_m", c.left_m, "m", "of the lens from the IMU", {-10, 10});
   table.add("up_m", c.up_m, "m", "of the lens from the IMU", {-10, 10});

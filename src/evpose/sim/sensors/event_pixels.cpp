@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "evpose/core/error.h"
 
@@ -120,7 +121,8 @@ std::optional<std::pair<double, bool>> first_crossing(const Signal& signal, doub
 
 }  // namespace
 
-EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::uint64_t seed)
+EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::uint64_t seed,
+                         std::vector<float> gain)
     : size_(size),
       config_(config),
       seed_(seed),
@@ -133,7 +135,10 @@ EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::u
       filtered_(low_.size()),
       log_last_(low_.size()),
       wake_(low_.size()),
+      gain_(std::move(gain)),
       pixels_(low_.size()) {
+  if (gain_.empty()) gain_.assign(pixels_.size(), 1);
+  EVPOSE_CHECK(gain_.size() == pixels_.size());
   EVPOSE_CHECK(config.dark_cd_m2 > 0 && config.threshold_on > 0 && config.threshold_off > 0);
   if (band_limited_) {
     tau_fast_s_ = 0.5 / (std::numbers::pi * config.bandwidth_max_hz);
@@ -152,7 +157,7 @@ EventPixels::EventPixels(ImageSize size, const EventCameraConfig& config, std::u
 
 void EventPixels::start(std::size_t pixel, TimeNs t, float luminance_cd_m2) {
   Pixel& p = pixels_[pixel];
-  const double level = std::max(0.0F, luminance_cd_m2) + dark_;
+  const double level = std::max(0.0F, luminance_cd_m2) * gain_[pixel] + dark_;
   const double log_level = std::log(level);
   filtered_[pixel] = log_last_[pixel] = static_cast<float>(log_level);
   draw_next_noise(pixel, t);

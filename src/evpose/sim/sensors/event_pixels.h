@@ -42,7 +42,9 @@ struct EventCameraConfig {
 /// over changes of up to a tenth.
 class EventPixels {
  public:
-  EventPixels(ImageSize size, const EventCameraConfig& config, std::uint64_t seed);
+  /// `gain`: fraction of the light that reaches each pixel; empty: all.
+  EventPixels(ImageSize size, const EventCameraConfig& config, std::uint64_t seed,
+              std::vector<float> gain = {});
 
   /// Initializes a pixel with its first luminance.
   void start(std::size_t pixel, TimeNs t, float luminance_cd_m2);
@@ -51,6 +53,8 @@ class EventPixels {
   /// span of the pixel. Appends its events in (t0, t1] in order of time, with t, x, y, on and cause.
   /// Different pixels may be advanced at the same time by different threads.
   void advance(std::size_t pixel, TimeNs t0, TimeNs t1, float from, float to, std::vector<SimEvent>& events) {
+    from *= gain_[pixel];
+    to *= gain_[pixel];
     Quiet<float> next{from, to, low_[pixel], high_[pixel], log_last_[pixel], filtered_[pixel]};
     if (t1 < wake_[pixel] && stays_quiet(t1 - t0, next)) {
       log_last_[pixel] = next.log_last;
@@ -66,8 +70,13 @@ class EventPixels {
   /// them, a bit for each. Nothing happens to the others.
   unsigned advance_quiet(std::size_t first, TimeNs t0, TimeNs t1, FloatLanes from, FloatLanes to,
                          IntLanes wanted) {
-    Quiet<FloatLanes> next{
-        from, to, load(&low_[first]), load(&high_[first]), load(&log_last_[first]), load(&filtered_[first])};
+    const FloatLanes gain = load(&gain_[first]);
+    Quiet<FloatLanes> next{from * gain,
+                           to * gain,
+                           load(&low_[first]),
+                           load(&high_[first]),
+                           load(&log_last_[first]),
+                           load(&filtered_[first])};
     const FloatLanes log_last = next.log_last, filtered = next.filtered;
     IntLanes quiet;
     for (int i = 0; i < kLanes; ++i) quiet[i] = t1 < wake_[first + i] ? -1 : 0;
@@ -159,6 +168,7 @@ class EventPixels {
   std::vector<float> filtered_;  ///< log luminance after the low pass
   std::vector<float> log_last_;  ///< log luminance before it
   std::vector<TimeNs> wake_;
+  std::vector<float> gain_;
   std::vector<Pixel> pixels_;
 };
 

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "evpose/core/config.h"
 #include "evpose/io/files/test_files.h"
+#include "evpose/sim/sensors/camera_rig.h"
 #include "evpose/sim/world/random.h"
 
 namespace evpose::sim {
@@ -99,6 +101,43 @@ TEST(EventSensor, LatencyIsThatOfTheDataSheetsAndGrowsInTheDark) {
     EXPECT_GT(step_latency_us(preset, 1), 300);
     EXPECT_GT(step_latency_us(preset, 1), 10 * step_latency_us(preset, 1000));
   }
+}
+
+TEST(Vignetting, FallsFromThePrincipalPointToTheGivenLossInTheFarthestCorner) {
+  CameraConfig camera;
+  for (const float gain : lens_gain(camera)) ASSERT_EQ(gain, 1);
+  camera.vignetting = 0.6;
+  const auto gain = lens_gain(camera);
+  const CameraIntrinsics c = intrinsics(camera);
+  const auto at = [&](int x, int y) {
+    return static_cast<double>(gain[static_cast<std::size_t>(y) * c.size.width + x]);
+  };
+  EXPECT_NEAR(*std::min_element(gain.begin(), gain.end()), 0.4, 1e-6);
+  const int cx = static_cast<int>(std::lround(c.cx)), cy = static_cast<int>(std::lround(c.cy));
+  EXPECT_GT(at(cx, cy), 0.99999);
+  // 1 / sqrt(gain) - 1 grows with the square of the radius.
+  const auto bend = [&](int x) { return (1 / std::sqrt(at(x, cy)) - 1) / std::pow(x - c.cx, 2); };
+  EXPECT_NEAR(bend(100) / bend(600), 1, 1e-3);
+  EXPECT_NEAR(bend(20) / bend(600), 1, 1e-3);
+}
+
+TEST(Vignetting, APixelWithLessLightIsAPixelInDimmerLight) {
+  EventCameraConfig config = pixels(EventSensorPreset::imx636);
+  EventPixels full({8, 1}, config, 3), lossy({8, 1}, config, 3, std::vector<float>(8, 0.25F));
+  std::vector<SimEvent> a, b;
+  for (std::size_t i = 0; i < 8; ++i) {
+    full.start(i, 0, 5);
+    lossy.start(i, 0, 20);
+    for (int k = 0; k < 400; ++k) {
+      const TimeNs t = k * 10 * kNsPerMs;
+      const auto level = [](int n) { return n % 2 == 0 ? 20.0F : 44.0F; };
+      full.advance(i, t, t + 10 * kNsPerMs, 0.25F * level(k), 0.25F * level(k + 1), a);
+      lossy.advance(i, t, t + 10 * kNsPerMs, level(k), level(k + 1), b);
+    }
+  }
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 1000u);
+  for (std::size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i].t, b[i].t);
 }
 
 TEST(EventSensor, ThePresetSelectsTheReadOutUnlessThatIsSet) {

@@ -27,8 +27,8 @@ std::uint8_t grey_value(double luminance, double white, double range_db) {
   return static_cast<std::uint8_t>(std::lround(255 * std::pow(std::min(luminance / white, 1.0), kGamma)));
 }
 
-Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, ImageSize size, const FramesConfig& config,
-                                          TimeNs end) {
+Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, const std::vector<float>& gain,
+                                          ImageSize size, const FramesConfig& config, TimeNs end) {
   if (config.rate_hz > 0) {
     if (config.exposure_ms * 1e-3 * config.rate_hz > 1)
       return Error{"frames.exposure_ms",
@@ -36,7 +36,7 @@ Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, ImageSize siz
                    "shorten the exposure or lower frames.rate_hz"};
     if (Status made = folder.make_folder("frames"); !made) return made.error();
   }
-  return FrameCamera(folder, size, config, end);
+  return FrameCamera(folder, gain, size, config, end);
 }
 
 std::vector<Exposure*> FrameCamera::exposures(TimeNs t0, TimeNs t1) {
@@ -70,7 +70,7 @@ Status FrameCamera::write_finished(TimeNs t) {
     }
     std::vector<std::uint8_t> grey(exposure.sum.size());
     for (std::size_t i = 0; i < grey.size(); ++i)
-      grey[i] = grey_value(exposure.sum[i] / length_s, white_, config_.range_db);
+      grey[i] = grey_value(gain_[i] * exposure.sum[i] / length_s, white_, config_.range_db);
     const std::string name = file_name(written_++);
     if (Status done = write_png_grey8(folder_->path("frames/" + name), size_.width, size_.height, grey);
         !done)

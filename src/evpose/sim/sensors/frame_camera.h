@@ -29,9 +29,9 @@ std::uint8_t grey_value(double luminance, double white, double range_db);
 /// Writes frames/NNNNNN.png and frames/timestamps.csv. The time of a frame is the middle of its exposure.
 class FrameCamera {
  public:
-  /// Keeps a reference to the folder.
-  static Expected<FrameCamera> create(const NewFolder& folder, ImageSize size, const FramesConfig& config,
-                                      TimeNs end);
+  /// Keeps a reference to the folder. `gain`: fraction of the light that reaches each pixel.
+  static Expected<FrameCamera> create(const NewFolder& folder, const std::vector<float>& gain, ImageSize size,
+                                      const FramesConfig& config, TimeNs end);
 
   /// Exposures that are open at some time in [t0, t1].
   std::vector<Exposure*> exposures(TimeNs t0, TimeNs t1);
@@ -41,10 +41,12 @@ class FrameCamera {
   int written() const { return written_; }
 
  private:
-  FrameCamera(const NewFolder& folder, ImageSize size, const FramesConfig& config, TimeNs end)
-      : folder_(&folder), size_(size), config_(config), white_(config.white_cd_m2), end_(end) {}
+  FrameCamera(const NewFolder& folder, const std::vector<float>& gain, ImageSize size,
+              const FramesConfig& config, TimeNs end)
+      : folder_(&folder), gain_(gain), size_(size), config_(config), white_(config.white_cd_m2), end_(end) {}
 
   const NewFolder* folder_;
+  std::vector<float> gain_;
   ImageSize size_;
   FramesConfig config_;
   double white_;

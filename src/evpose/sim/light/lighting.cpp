@@ -77,38 +77,39 @@ class LightBaker {
  private:
   double sun_visibility(const Eigen::Vector3d& point, const Light& light) const {
     const TangentBasis basis = tangent_basis(light.direction);
-    int seen = 0;
+    std::array<RayCaster::Segment, kShadowRays> segments;
     for (int i = 0; i < kShadowRays; ++i) {
       const Eigen::Vector2d at = light.radius * disc_[i];
       const Eigen::Vector3d direction = -light.direction + at.x() * basis.a + at.y() * basis.b;
-      if (!rays_.occluded(point, direction, kRayOffset_m, std::numeric_limits<float>::infinity())) ++seen;
+      segments[i] = {direction.cast<float>(), kRayOffset_m, std::numeric_limits<float>::infinity()};
     }
-    return static_cast<double>(seen) / kShadowRays;
+    return static_cast<double>(rays_.count_free(point, segments)) / kShadowRays;
   }
 
   double lamp_visibility(const Eigen::Vector3d& point, const Light& light) const {
     const TangentBasis basis = tangent_basis((light.position - point).normalized());
-    int seen = 0;
+    std::array<RayCaster::Segment, kShadowRays> segments;
     for (int i = 0; i < kShadowRays; ++i) {
       const Eigen::Vector2d at = light.radius * disc_[i];
       const Eigen::Vector3d direction = light.position + at.x() * basis.a + at.y() * basis.b - point;
       const auto length = static_cast<float>(direction.norm());
       // The housing of the lamp casts no shadow.
       const float end = 1 - std::min(0.5F, (static_cast<float>(light.radius) + 0.02F) / length);
-      if (!rays_.occluded(point, direction, kRayOffset_m / length, end)) ++seen;
+      segments[i] = {direction.cast<float>(), kRayOffset_m / length, end};
     }
-    return static_cast<double>(seen) / kShadowRays;
+    return static_cast<double>(rays_.count_free(point, segments)) / kShadowRays;
   }
 
   double ambient_visibility(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
     const TangentBasis basis = tangent_basis(normal);
-    int visible = 0;
-    for (const Eigen::Vector2d& at : sky_) {
+    std::array<RayCaster::Segment, kAmbientRays> segments;
+    for (int i = 0; i < kAmbientRays; ++i) {
+      const Eigen::Vector2d& at = sky_[i];
       const Eigen::Vector3d direction =
           at.x() * basis.a + at.y() * basis.b + std::sqrt(std::max(0.0, 1 - at.squaredNorm())) * normal;
-      if (!rays_.occluded(point, direction, kRayOffset_m, static_cast<float>(kOcclusionReach_m))) ++visible;
+      segments[i] = {direction.cast<float>(), kRayOffset_m, static_cast<float>(kOcclusionReach_m)};
     }
-    return static_cast<double>(visible) / kAmbientRays;
+    return static_cast<double>(rays_.count_free(point, segments)) / kAmbientRays;
   }
 
   const RayCaster& rays_;

@@ -150,6 +150,36 @@ void RayCaster::trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen
   }
 }
 
+int RayCaster::count_free(const Eigen::Vector3d& origin, std::span<const Segment> segments) const {
+  constexpr std::size_t kWide = 8;
+  const Eigen::Vector3f from = origin.cast<float>();
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  int free = 0;
+  for (std::size_t first = 0; first < segments.size(); first += kWide) {
+    const std::size_t n = std::min(kWide, segments.size() - first);
+    RTCRay8 rays{};
+    alignas(32) std::array<int, kWide> valid{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const Segment& segment = segments[first + i];
+      valid[i] = -1;
+      rays.org_x[i] = from.x();
+      rays.org_y[i] = from.y();
+      rays.org_z[i] = from.z();
+      rays.dir_x[i] = segment.direction.x();
+      rays.dir_y[i] = segment.direction.y();
+      rays.dir_z[i] = segment.direction.z();
+      rays.tnear[i] = segment.near;
+      rays.tfar[i] = segment.far;
+      rays.mask[i] = ~0u;
+    }
+    rtcOccluded8(valid.data(), impl_->still.get(), &context, &rays);
+    for (std::size_t i = 0; i < n; ++i) free += !(rays.tfar[i] < 0);
+  }
+  return free;
+}
+
 bool RayCaster::occluded(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near,
                          float far) const {
   RTCRay ray = make_ray(origin, direction, near, far);

@@ -98,8 +98,10 @@ void TileRaster::draw(const PreparedScene& prepared, const SceneView& view,
   if (uniform_) {
     shape_.fill(shapes_.empty() ? kSky : 0);
     group_.fill(shapes_.empty() ? kSky : shapes_[0].group);
+    largest_nearness_ = shapes_.empty() ? 0 : shapes_[0].largest;
     return;
   }
+  FloatLanes largest{};
   for (int i = 0; i < kPlaces; i += kLanes) {
     const FloatLanes x = load(&x_[i]), y = load(&y_[i]);
     FloatLanes nearest{};
@@ -111,15 +113,12 @@ void TileRaster::draw(const PreparedScene& prepared, const SceneView& view,
       shape = select(front, IntLanes{} + static_cast<std::int32_t>(s), shape);
       group = select(front, IntLanes{} + shapes_[s].group, group);
     }
-    store(&nearness_[i], nearest);
     store(&shape_[i], shape);
     store(&group_[i], group);
+    largest = larger(largest, nearest);
   }
-}
-
-float TileRaster::largest_nearness() const {
-  if (!uniform_) return *std::max_element(nearness_.begin(), nearness_.end());
-  return shapes_.empty() ? 0 : shapes_[0].largest;
+  largest_nearness_ = 0;
+  for (int i = 0; i < kLanes; ++i) largest_nearness_ = std::max<float>(largest_nearness_, largest[i]);
 }
 
 TileRaster::Found TileRaster::find(FloatLanes x, FloatLanes y) const {

@@ -42,8 +42,8 @@ class TileRaster {
   /// Number of the shape at each place; kSky: none.
   const std::array<std::int32_t, kPlaces>& shape() const { return shape_; }
   const std::array<std::int32_t, kPlaces>& group() const { return group_; }
-  const std::array<float, kPlaces>& nearness() const { return nearness_; }
-  float largest_nearness() const;
+  /// Of the nearest place, 1 / m; 0: only sky.
+  float largest_nearness() const { return largest_nearness_; }
   /// Directions of the places.
   const std::array<float, kPlaces>& x() const { return x_; }
   const std::array<float, kPlaces>& y() const { return y_; }
@@ -58,11 +58,12 @@ class TileRaster {
  private:
   void choose(const PreparedScene& prepared, const SceneView& view, std::span<const std::uint32_t> triangles);
 
-  alignas(32) std::array<float, kPlaces> x_{}, y_{}, nearness_{};
+  alignas(32) std::array<float, kPlaces> x_{}, y_{};
   alignas(32) std::array<std::int32_t, kPlaces> shape_{}, group_{};
   std::array<Eigen::Vector3f, 4> corners_;
   std::vector<Shape> shapes_;
   bool uniform_ = false;
+  float largest_nearness_ = 0;
 };
 
 }  // namespace evpose::sim

@@ -23,11 +23,6 @@ void TileSampler::set_plan(const TilePlan& plan) {
   queue_.set_tile(rays_, size_, plan.tile);
 }
 
-float TileSampler::nearest_m(const SceneView& view) {
-  raster_.draw(prepared_, view, plan_->triangles);
-  return 1 / raster_.largest_nearness();
-}
-
 TileSampler::Hit TileSampler::hit_of(std::int32_t shape, float x, float y) const {
   Hit hit;
   if (shape == kSky) return hit;

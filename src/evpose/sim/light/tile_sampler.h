@@ -52,9 +52,6 @@ class TileSampler {
     TileSampler& sampler_;
   };
 
-  /// Depth of the nearest static surface in a view, m; infinite: only sky.
-  float nearest_m(const SceneView& view);
-
   const PixelRay& ray(std::size_t pixel) const {
     const std::size_t x = pixel % kTilePx, y = pixel / kTilePx;
     return rays_[(plan_->tile.y0 + y) * size_.width + plan_->tile.x0 + x];

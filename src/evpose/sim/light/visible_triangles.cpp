@@ -133,9 +133,9 @@ void VisibleTriangles::fill_row(const std::vector<std::vector<Candidate>>& candi
     std::sort(list.begin(), list.end(), [](const Placed& a, const Placed& b) {
       return a.nearness != b.nearness ? a.nearness > b.nearness : a.triangle < b.triangle;
     });
-    auto& found = found_[static_cast<std::size_t>(row) * columns_ + column];
-    found.clear();
-    for (const Placed& p : list) found.push_back(p.triangle);
+    const std::size_t tile = static_cast<std::size_t>(row) * columns_ + column;
+    found_[tile].clear();
+    for (const Placed& p : list) found_[tile].push_back(p.triangle);
   }
 }
 

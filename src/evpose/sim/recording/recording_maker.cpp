@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <optional>
 
 #include "evpose/core/config.h"
@@ -202,17 +203,24 @@ Status RecordingMaker::expose(const PreparedScene& prepared, const Camera& camer
   ReadOut read_out(camera.size(), scenario_.read_out, static_cast<std::uint64_t>(scenario_.seed));
   PixelIntegrator integrator(prepared, camera, rays, path, scenario_.integrator, pixels, pool_);
   integrator.start(0);
-  std::vector<SimEvent> events, delivered;
+  std::vector<SimEvent> events, ready, delivered;
+  // The events of a block are read out and written while the next block is made.
+  std::future<Status> writing;
   for (TimeNs t = 0; t < end;) {
     events.clear();
-    delivered.clear();
     t = integrator.advance(end, frames->exposures(t, t + from_seconds(scenario_.integrator.block_s)), events);
-    read_out.push(events, t, delivered);
-    if (t == end) read_out.finish(delivered);
-    if (Status done = sink->write(delivered, counts_); !done) return done;
+    if (Status done = writing.valid() ? writing.get() : Status{}; !done) return done;
+    std::swap(events, ready);
+    writing = std::async(std::launch::async, [&, t]() -> Status {
+      delivered.clear();
+      read_out.push(ready, t, delivered);
+      if (t == end) read_out.finish(delivered);
+      return sink->write(delivered, counts_);
+    });
     if (Status done = frames->write_finished(t); !done) return done;
     report(static_cast<double>(t) / static_cast<double>(end));
   }
+  if (Status done = writing.valid() ? writing.get() : Status{}; !done) return done;
   counts_.read_out = read_out.counts();
   counts_.integrator = integrator.counts();
   counts_.frames = frames->written();

@@ -26,31 +26,31 @@ constexpr std::uint64_t kHotStream = 1ULL << 40;
 
 double seconds(TimeNs t) { return 1e-9 * static_cast<double>(t); }
 
-/// Where a monotonic function reaches `level` in [low, high], nanoseconds. Newton, or bisection where that
-/// leaves the bracket.
+struct ValueAndSlope {
+  double value, slope;
+};
+
+/// Where a monotonic function reaches `level` between `low` and `high`, nanoseconds, where it has the values
+/// `at_low` and `at_high`. Newton from the chord, or bisection where that leaves the bracket.
 template <class Function>
-double root(const Function& function, double level, double low, double high) {
-  const bool rising = function.value(high) > function.value(low);
-  double s = low;
+double root(const Function& function, double level, double low, double high, double at_low, double at_high) {
+  const bool rising = at_high > at_low;
+  double s = low + (high - low) * (level - at_low) / (at_high - at_low);
   for (int i = 0; i < 100 && high - low > 0.25; ++i) {
-    const double miss = function.value(s) - level;
+    if (!(s >= low && s <= high)) s = 0.5 * (low + high);
+    const ValueAndSlope here = function.value_and_slope(s);
+    const double miss = here.value - level;
     if ((miss < 0) == rising) {
       low = s;
     } else {
       high = s;
     }
-    const double step = -miss / function.slope(s);
-    if (std::abs(step) < 0.05) return std::clamp(s + step, low, high);
+    const double step = -miss / here.slope;
+    if (std::abs(step) < 0.5) return std::clamp(s + step, low, high);  // what is left is far smaller
     s += step;
-    if (!(s > low && s < high)) s = 0.5 * (low + high);
   }
   return high;
 }
-
-struct Crossing {
-  TimeNs t;
-  bool on;
-};
 
 }  // namespace
 
@@ -62,7 +62,7 @@ class EventPixels::LinearLuminance {
   double level(double s) const { return from_ + gain_ * s; }
   double log_luminance(double s) const { return std::log(level(s)); }
   double value(double s) const { return log_luminance(s) + offset_ + leak_ * s; }
-  double slope(double s) const { return gain_ / level(s) + leak_; }
+  ValueAndSlope value_and_slope(double s) const { return {value(s), gain_ / level(s) + leak_}; }
   /// Where the slope is zero; NaN if there is no such point.
   double turn() const {
     return leak_ > 0 && gain_ < 0 ? (-gain_ / leak_ - from_) / gain_
@@ -73,7 +73,8 @@ class EventPixels::LinearLuminance {
   double from_, gain_, offset_, leak_;
 };
 
-/// Response of a first-order low pass to a linear log luminance, plus leak.
+/// Response of a first-order low pass to a linear log luminance, plus leak. The exponential is good to 3e-7
+/// of the swing, far below any threshold.
 class EventPixels::LowPassResponse {
  public:
   struct Input {
@@ -85,19 +86,32 @@ class EventPixels::LowPassResponse {
   LowPassResponse(const Input& in, double offset, double leak_per_ns)
       : level_(in.level),
         gain_((in.to - in.from) / in.length_ns),
-        tau_(in.tau_ns),
+        per_tau_(1 / in.tau_ns),
         start_(in.from - gain_ * in.tau_ns),
         swing_(in.filtered - start_),
         offset_(offset),
-        leak_(leak_per_ns) {}
+        leak_(leak_per_ns) {
+    // The slope is zero where the exponential has this value.
+    const double rest = (gain_ + leak_) * in.tau_ns / swing_;
+    turn_ = rest > kLeast && rest < 1 ? -in.tau_ns * static_cast<double>(fast_log(static_cast<float>(rest)))
+                                      : std::numeric_limits<double>::quiet_NaN();
+  }
   double level(double) const { return level_; }
-  double log_luminance(double s) const { return start_ + gain_ * s + swing_ * std::exp(-s / tau_); }
+  double log_luminance(double s) const { return start_ + gain_ * s + rest(s); }
   double value(double s) const { return log_luminance(s) + offset_ + leak_ * s; }
-  double slope(double s) const { return gain_ + leak_ - swing_ / tau_ * std::exp(-s / tau_); }
-  double turn() const { return -tau_ * std::log((gain_ + leak_) * tau_ / swing_); }
+  ValueAndSlope value_and_slope(double s) const {
+    const double now = rest(s);
+    return {start_ + gain_ * s + now + offset_ + leak_ * s, gain_ + leak_ - now * per_tau_};
+  }
+  /// Where the slope is zero; NaN if there is no such point ahead.
+  double turn() const { return turn_; }
 
  private:
-  double level_, gain_, tau_, start_, swing_, offset_, leak_;
+  static constexpr double kLeast = 1e-30;  // of the exponential; later, the signal is a straight line
+  double rest(double s) const {
+    return swing_ * static_cast<double>(fast_exp(static_cast<float>(std::max(-70.0, -s * per_tau_))));
+  }
+  double level_, gain_, per_tau_, start_, swing_, offset_, leak_, turn_;
 };
 
 namespace {
@@ -109,14 +123,15 @@ std::optional<std::pair<double, bool>> first_crossing(const Signal& signal, doub
                                                       double on, double off) {
   const auto crossing = [&](double a, double b) -> std::optional<std::pair<double, bool>> {
     const double end = signal.value(b);
-    if (end >= on) return std::pair(signal.value(a) >= on ? a : root(signal, on, a, b), true);
-    if (end <= off) return std::pair(signal.value(a) <= off ? a : root(signal, off, a, b), false);
-    return std::nullopt;
+    if (end < on && end > off) return std::nullopt;
+    const double start = signal.value(a);
+    if (end >= on) return std::pair(start >= on ? a : root(signal, on, a, b, start, end), true);
+    return std::pair(start <= off ? a : root(signal, off, a, b, start, end), false);
   };
   const double turn = signal.turn();
-  if (turn > low && turn < high)
-    if (const auto found = crossing(low, turn)) return found;
-  return crossing(turn > low && turn < high ? turn : low, high);
+  if (!(turn > low && turn < high)) return crossing(low, high);
+  if (const auto found = crossing(low, turn)) return found;
+  return crossing(turn, high);
 }
 
 }  // namespace
@@ -278,7 +293,7 @@ void EventPixels::advance_unfiltered(std::size_t pixel, const Span& span, std::v
 void EventPixels::advance_filtered(std::size_t pixel, const Span& span, std::vector<SimEvent>& events) {
   float &log_last = log_last_[pixel], &filtered = filtered_[pixel];
   const double from = std::max(0.0, span.from) + dark_, to = std::max(0.0, span.to) + dark_;
-  const double change = std::log(to / from);
+  const auto change = static_cast<double>(fast_log(static_cast<float>(to / from)));
   const int steps = 1 + static_cast<int>(std::abs(change) / kSmallChange);
   double level = from;
   TimeNs t = span.t0;
@@ -289,13 +304,13 @@ void EventPixels::advance_filtered(std::size_t pixel, const Span& span, std::vec
                                                                      (next - from) / (to - from));
     if (t_next > t) {
       const double mean = 0.5 * (level + next), length_ns = static_cast<double>(t_next - t);
-      const double log_next = std::log(next);
+      const float log_next = fast_log(static_cast<float>(next));
       const LowPassResponse response(
           {log_last, log_next, mean, filtered, length_ns, 1e9 * time_constant_s(mean)},
           leak_per_s_ * seconds(t), 1e-9 * leak_per_s_);
       emit_events(pixel, t, t_next, response, events);
       filtered = static_cast<float>(response.log_luminance(length_ns));
-      log_last = static_cast<float>(log_next);
+      log_last = log_next;
     }
     level = next;
     t = t_next;

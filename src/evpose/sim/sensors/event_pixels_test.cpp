@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -271,6 +273,46 @@ TEST(EventPixels, FirstReferencesLieAnywhereBetweenTheThresholds) {
   }
   EXPECT_NEAR(sum / kCount, 0.24, 0.011);
   EXPECT_NEAR(squares / kCount - std::pow(sum / kCount, 2), 0.48 * 0.48 / 12, 0.0015);
+}
+
+// Pixels in lanes, and those that stay behind one by one, trigger the events of pixels one by one.
+TEST(EventPixels, EightAtOnceAreEightTimesOne) {
+  for (const double bandwidth : {0.0, 20.0}) {
+    EventCameraConfig config;
+    config.bandwidth_hz_per_cd_m2 = bandwidth;
+    config.shot_noise_dark_hz = config.shot_noise_bright_hz = 10;
+    EventPixels together({kLanes, 1}, config, 9), apart({kLanes, 1}, config, 9);
+    Random random(1);
+    std::array<float, kLanes> from, to;
+    std::vector<SimEvent> a, b;
+    int quiet = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      from[i] = static_cast<float>(random.uniform(1, 100));
+      together.start(i, 0, from[i]);
+      apart.start(i, 0, from[i]);
+    }
+    for (TimeNs t = 0; t < kNsPerS; t += kNsPerMs) {
+      for (float& v : to)
+        v = from[&v - to.data()] * static_cast<float>(std::exp(random.uniform(-0.06, 0.06)));
+      const IntLanes wanted = kLaneNumbers != static_cast<std::int32_t>(t / kNsPerMs % 9);
+      const unsigned done =
+          together.advance_quiet(0, t, t + kNsPerMs, load(from.data()), load(to.data()), wanted);
+      quiet += std::popcount(done);
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        if ((done >> i & 1) == 0) together.advance(i, t, t + kNsPerMs, from[i], to[i], a);
+        apart.advance(i, t, t + kNsPerMs, from[i], to[i], b);
+      }
+      from = to;
+    }
+    EXPECT_GT(quiet, 5000);
+    EXPECT_GT(a.size(), 100U);
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].t, b[i].t);
+      ASSERT_EQ(a[i].x, b[i].x);
+      ASSERT_EQ(a[i].on, b[i].on);
+    }
+  }
 }
 
 struct Counts {

@@ -17,8 +17,8 @@ namespace evpose::sim {
 namespace {
 
 // Numbers of samples that a tile may take in a block. All divide kGrid, so that few views serve all tiles.
-constexpr std::array<int, 8> kCounts = {1, 2, 3, 4, 6, 8, 12, 16};
-constexpr int kGrid = 48;
+constexpr std::array<int, 11> kCounts = {1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20};
+constexpr int kGrid = 120;
 constexpr double kShortestBlock_s = 2e-6;
 constexpr double kMargin = 1.2;  // the flow may get faster within a block
 
@@ -139,11 +139,11 @@ void PixelIntegrator::Impl::prepare_tiles() {
 // The nearest surface of each tile.
 void PixelIntegrator::Impl::measure_depths(const SceneView& view) {
   pool.for_chunks(tiles.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
-    TileSampler sampler(prepared, rays, size);
+    TileRaster raster;
     for (std::size_t k = begin; k < end; ++k) {
-      const TilePlan plan{tiles[k].tile, triangles.of_tile(k), {}};
-      sampler.set_plan(plan);
-      tiles[k].nearest = std::max(sampler.nearest_m(view), static_cast<float>(kNearest_m));
+      raster.set_tile(rays, size, tiles[k].tile);
+      raster.draw(prepared, view, triangles.of_tile(k));
+      tiles[k].nearest = std::max(1 / raster.largest_nearness(), static_cast<float>(kNearest_m));
     }
   });
 }
@@ -342,7 +342,7 @@ TimeNs PixelIntegrator::advance(TimeNs end, const std::vector<Exposure*>& exposu
 void describe(ConfigTable& table, PixelIntegratorConfig& config) {
   table.add("step_px", config.step_px, "px", "optical flow between two samples of a tile", {0.05, 2});
   table.add("block_px", config.block_px, "px",
-            "optical flow within a block, at whose ends surfaces are traced", {1, 8});
+            "optical flow within a block, for which the triangles in view are found", {1, 8});
   table.add("block_s", config.block_s, "s", "longest block", {1e-4, 0.1});
   table.add("max_flow_px_s", config.max_flow_px_s, "px/s", "flights with a faster optical flow are refused",
             {1, 1e6});

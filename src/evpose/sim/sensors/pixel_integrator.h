@@ -21,8 +21,8 @@ namespace evpose::sim {
 /// Resolution of the rendered luminance in time.
 struct PixelIntegratorConfig {
   double step_px = 0.5;          ///< optical flow between two samples of a tile
-  double block_px = 5;           ///< optical flow within a block
-  double block_s = 0.01;         ///< longest block
+  double block_px = 8;           ///< optical flow within a block
+  double block_s = 0.02;         ///< longest block
   double max_flow_px_s = 20000;  ///< flights with a faster optical flow are refused
   double veiling_glare =
       0.02;  ///< fraction of the mean luminance of the image that the lens scatters over it

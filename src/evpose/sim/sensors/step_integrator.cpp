@@ -57,8 +57,18 @@ void StepIntegrator::advance_along(std::size_t i, const LuminanceCurve& curve) {
   annotate(i, first_event);
 }
 
+void StepIntegrator::add_uneven(std::size_t i, Uneven& uneven) const {
+  const int between = before.patch[i] >= 0 && before.patch[i] == after.patch[i]
+                          ? texture_samples_between(before.luminance[i], after.luminance[i])
+                          : 0;
+  uneven.pixel[uneven.count] = static_cast<std::uint8_t>(i);
+  uneven.between[uneven.count] = static_cast<std::uint8_t>(between);
+  ++uneven.wanting[between];
+  ++uneven.count;
+}
+
 // Advances the pixels whose luminance hardly changes; lists the others.
-void StepIntegrator::advance_even(std::vector<std::uint16_t>& uneven) {
+void StepIntegrator::advance_even(Uneven& uneven) {
   for (int y = 0; y < plan.tile.height; ++y) {
     for (int x = 0; x < plan.tile.width; x += kLanes) {
       const std::size_t first = static_cast<std::size_t>(y) * kTilePx + x;
@@ -75,7 +85,7 @@ void StepIntegrator::advance_even(std::vector<std::uint16_t>& uneven) {
           expose(i, line(before.luminance[i], after.luminance[i]));
         if ((left >> k & 1) == 0) continue;
         if (!nearly_equal(before.luminance[i], after.luminance[i])) {
-          uneven.push_back(static_cast<std::uint16_t>(i));
+          add_uneven(i, uneven);
           continue;
         }
         const std::size_t first_event = events.size();
@@ -86,35 +96,34 @@ void StepIntegrator::advance_even(std::vector<std::uint16_t>& uneven) {
   }
 }
 
-void StepIntegrator::advance_uneven(const std::vector<std::uint16_t>& uneven) {
-  // Between two samples of one texture: number of further samples.
-  const auto between = [&](std::size_t i) {
-    if (before.patch[i] < 0 || before.patch[i] != after.patch[i]) return 0;
-    return texture_samples_between(before.luminance[i], after.luminance[i]);
-  };
-  std::array<Resampled, kQuarters> quarters;
+void StepIntegrator::advance_uneven(const Uneven& uneven) {
+  std::array<std::array<float, kTilePixels>, kQuarters> quarters;  // luminance, by place in the list
   for (int k = 0; k < kQuarters; ++k) {
-    std::vector<std::uint16_t> wanted;
-    for (const std::uint16_t i : uneven)
-      if (between(i) == kQuarters || (between(i) == 1 && k == 1)) wanted.push_back(i);
-    if (wanted.empty()) continue;
+    const bool middle = k == 1;
+    if (uneven.wanting[kQuarters] == 0 && !(middle && uneven.wanting[1] > 0)) continue;
     const SceneView view = interpolate_view(views[0], views[1], 0.25 * (k + 1));
     TileSampler::Again again(sampler, view);
-    for (const std::uint16_t i : wanted) again.add(i, after.patch[i]);
+    const auto wants = [&](std::size_t u) {
+      return uneven.between[u] == kQuarters || (middle && uneven.between[u] == 1);
+    };
+    for (std::size_t u = 0; u < uneven.count; ++u)
+      if (wants(u)) again.add(uneven.pixel[u], after.patch[uneven.pixel[u]]);
     again.shade();
-    for (std::size_t w = 0; w < wanted.size(); ++w) quarters[k].luminance[wanted[w]] = again.luminance(w);
+    std::size_t answer = 0;
+    for (std::size_t u = 0; u < uneven.count; ++u)
+      if (wants(u)) quarters[k][u] = again.luminance(answer++);
   }
-  for (const std::uint16_t i : uneven) {
+  for (std::size_t u = 0; u < uneven.count; ++u) {
+    const std::size_t i = uneven.pixel[u];
     LuminanceCurve curve = line(before.luminance[i], after.luminance[i]);
     if (before.border[i] >= 0 || after.border[i] >= 0) {
       const PixelSample p = before.pixel(i), q = after.pixel(i);
       if (has_border(p) || has_border(q))
         curve = border_curve(prepared, views[0], views[1], sampler.ray(i), p, q);
-    } else if (const int count = between(i); count > 0) {
+    } else if (uneven.between[u] > 0) {
       curve.knots = 1;
-      const int step = 4 / (count + 1);
-      for (int k = step; k < 4; k += step)
-        curve.add(0.25F * static_cast<float>(k), quarters[k - 1].luminance[i]);
+      const int step = 4 / (uneven.between[u] + 1);
+      for (int k = step; k < 4; k += step) curve.add(0.25F * static_cast<float>(k), quarters[k - 1][u]);
       curve.add(1, after.luminance[i]);
     }
     advance_along(i, curve);
@@ -122,7 +131,7 @@ void StepIntegrator::advance_uneven(const std::vector<std::uint16_t>& uneven) {
 }
 
 void StepIntegrator::integrate() {
-  std::vector<std::uint16_t> uneven;
+  Uneven uneven;
   advance_even(uneven);
   advance_uneven(uneven);
 }

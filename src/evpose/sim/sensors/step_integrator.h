@@ -32,16 +32,20 @@ struct StepIntegrator {
 
  private:
   static constexpr int kQuarters = 3;
-  struct Resampled {
-    std::array<float, kTilePixels> luminance;
+  /// Pixels whose luminance changes much, and how often their texture is sampled in between.
+  struct Uneven {
+    std::size_t count = 0;
+    std::array<std::uint8_t, kTilePixels> pixel, between;
+    std::array<std::size_t, kQuarters + 1> wanting{};  ///< pixels by number of samples in between
   };
 
   std::size_t index(std::size_t in_tile) const {
     return (plan.tile.y0 + in_tile / kTilePx) * size.width + plan.tile.x0 + in_tile % kTilePx;
   }
-  void advance_even(std::vector<std::uint16_t>& uneven);
+  void advance_even(Uneven& uneven);
+  void add_uneven(std::size_t in_tile, Uneven& uneven) const;
   void advance_along(std::size_t in_tile, const LuminanceCurve& curve);
-  void advance_uneven(const std::vector<std::uint16_t>& uneven);
+  void advance_uneven(const Uneven& uneven);
   void annotate(std::size_t in_tile, std::size_t first_event);
   void expose(std::size_t in_tile, const LuminanceCurve& curve);
 };

@@ -96,11 +96,23 @@ Texture::Texture(double width_m, double height_m, double texel_m, const Pattern&
   values_.shrink_to_fit();
 }
 
+template <class V>
+struct Texture::Level {
+  V columns, rows;
+  typename LaneTypes<V>::Int first, stride;  // in values_
+};
+
+template <class V>
+Texture::Level<V> Texture::level(typename LaneTypes<V>::Int number) const {
+  return {gather(columns_.data(), number), gather(rows_.data(), number), gather(first_.data(), number),
+          gather(stride_.data(), number)};
+}
+
 // Bilinear; (u, v) as fractions of the rectangle, in [0, 1].
 template <class V>
-V Texture::sample(typename LaneTypes<V>::Int level, V u, V v) const {
+V Texture::sample(const Level<V>& level, V u, V v) const {
   using Int = typename LaneTypes<V>::Int;
-  const V columns = gather(columns_.data(), level), rows = gather(rows_.data(), level);
+  const V &columns = level.columns, &rows = level.rows;
   V x = u * columns - 0.5F, y = v * rows - 0.5F;
   x = select(x < 0.0F, V(x + columns), x);
   y = select(y < 0.0F, V(y + rows), y);
@@ -108,9 +120,8 @@ V Texture::sample(typename LaneTypes<V>::Int level, V u, V v) const {
   y = select(y < rows, y, all<V>(0));
   const Int i = to_int(x), j = to_int(y);
   const V a = x - to_float(i), b = y - to_float(j);
-  const Int stride = gather(stride_.data(), level);
-  const Int at = gather(first_.data(), level) + j * stride + i;
-  const Int low = gather_pair(values_.data(), at), high = gather_pair(values_.data(), Int(at + stride));
+  const Int at = level.first + j * level.stride + i;
+  const Int low = gather_pair(values_.data(), at), high = gather_pair(values_.data(), Int(at + level.stride));
   const auto mix = [&a](Int pair) {
     const V from = to_float(Int(pair & 0xFFFF)), to = to_float(Int((pair >> 16) & 0xFFFF));
     return V(from + a * (to - from));
@@ -169,14 +180,15 @@ template <class V>
 V Texture::mean(const Footprint<V>& at) const {
   const Filter<V> f = filter(at);
   const bool blends = any(f.blend > 0.0F);
+  const Level<V> fine = level<V>(f.fine), coarse = level<V>(f.coarse);
   V sum{};
   for (std::int32_t i = 0; any(i < f.taps); ++i) {
     const V along = (static_cast<float>(i) + 0.5F) * f.step - 0.5F * f.major;
     V u = (at.u + along * f.axis_u) / width_, v = (at.v + along * f.axis_v) / height_;
     u = u - round_down(u);
     v = v - round_down(v);
-    V value = sample(f.fine, u, v);
-    if (blends) value = value + f.blend * (sample(f.coarse, u, v) - value);
+    V value = sample(fine, u, v);
+    if (blends) value = value + f.blend * (sample(coarse, u, v) - value);
     sum = sum + select(i < f.taps, value, all<V>(0));
   }
   return sum / (kWhite * to_float(f.taps));

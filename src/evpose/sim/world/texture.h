@@ -37,7 +37,11 @@ class Texture {
   template <class V>
   Filter<V> filter(const Footprint<V>& at) const;
   template <class V>
-  V sample(typename LaneTypes<V>::Int level, V u, V v) const;
+  struct Level;
+  template <class V>
+  Level<V> level(typename LaneTypes<V>::Int number) const;
+  template <class V>
+  V sample(const Level<V>& level, V u, V v) const;
   void add_level(int columns, int rows, const std::vector<std::uint16_t>& values);
 
   float width_, height_, texel_;

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/sim/light/tile_sampler.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "evpose/core/parallel.h"
+#include "evpose/sim/light/test_scene.h"
+#include "evpose/sim/light/visible_triangles.h"
+#include "evpose/sim/world/random.h"
+#include "evpose/sim/world/texture.h"
+
+namespace evpose::sim {
+namespace {
+
+constexpr ImageSize kSize{72, 56};  // not a multiple of a tile
+
+// Boxes of all sizes before a wall, some of them beside and behind the camera.
+Scene cluttered() {
+  TestScene plain;
+  plain.add({6, -6, -6}, {0, 0, 12}, {0, 12, 0}, 0.5);
+  Random random(5);
+  for (int i = 0; i < 50; ++i) {
+    const double x = random.uniform(0, 5.5), spread = 0.3 + 0.6 * std::abs(x);
+    const double side = 0.1 * (1 + std::abs(x)) * random.uniform(0.5, 2);
+    TestScene::add_box(
+        plain.scene.mesh, {x, random.uniform(-spread, spread), random.uniform(-spread, spread)},
+        {side, side * random.uniform(0.3, 1), side}, plain.material(random.uniform(0.05, 0.9)));
+  }
+  plain.scene.sky_cd_m2 = 2;
+  return plain.scene;
+}
+
+struct Place {
+  Place()
+      : pool(1),
+        scene(cluttered()),
+        prepared(scene, pool),
+        camera(test_camera(kSize.width, kSize.height, 50)) {
+    rays = *pixel_rays(*camera);
+    for (int y = 0; y < kSize.height; y += kTilePx)
+      for (int x = 0; x < kSize.width; x += kTilePx)
+        tiles.push_back({x, y, std::min(kTilePx, kSize.width - x), std::min(kTilePx, kSize.height - y)});
+  }
+  SceneView view(double way) const {
+    Pose pose = looking_along_x({-0.3 + 0.2 * way, 0.05 * way, 0.02});
+    pose.q = so3::exp({0, 0, 0.05 * way}) * pose.q;
+    return make_scene_view(prepared, 0, pose);
+  }
+  // Depth along a ray of the camera, 0: sky.
+  float depth(const SceneView& at, const Eigen::Vector3f& direction) const {
+    const auto hit = prepared.rays.trace(at.T_map_cam.p, at.R_map_cam * direction.cast<double>());
+    return hit ? hit->distance : 0;
+  }
+
+  ThreadPool pool;
+  Scene scene;
+  PreparedScene prepared;
+  std::shared_ptr<const Camera> camera;
+  std::vector<PixelRay> rays;
+  std::vector<Tile> tiles;
+};
+
+// The rasteriser finds what rays find, at both ends of a motion and in between.
+TEST(TileRaster, SeesWhatRaysSee) {
+  const Place place;
+  VisibleTriangles visible(place.prepared, place.rays, kSize, place.tiles);
+  ThreadPool pool(2);
+  // A tenth of the way is 0.25 px of turn and up to a few pixels of approach.
+  const SceneView from = place.view(0), to = place.view(0.3);
+  visible.find(from, to, pool);
+  TileRaster raster;
+  int seen = 0, different = 0, nearer = 0;
+  for (const double way : {0.0, 0.1, 0.2, 0.3}) {
+    const SceneView at = place.view(way);
+    for (std::size_t k = 0; k < place.tiles.size(); ++k) {
+      raster.set_tile(place.rays, kSize, place.tiles[k]);
+      raster.draw(place.prepared, at, visible.of_tile(k));
+      for (std::size_t i = 0; i < TileRaster::kPlaces; ++i) {
+        const Eigen::Vector3f direction(raster.x()[i], raster.y()[i], 1);
+        const float wanted = place.depth(at, direction);
+        const std::int32_t shape = raster.shape()[i];
+        const float found = shape == kSky ? 0 : 1 / raster.shapes()[shape].plane.nearness.dot(direction);
+        ++seen;
+        different += !(std::abs(found - wanted) <= 1e-3F * wanted);
+        nearer += wanted > 0 && 1 / wanted > 1.001F * raster.largest_nearness();
+      }
+    }
+  }
+  EXPECT_GT(seen, 30000);
+  EXPECT_LE(different, seen / 5000);  // rays that meet an edge within rounding
+  EXPECT_LE(nearer, seen / 5000);
+}
+
+// The luminance of a pixel is its mean over many rays.
+TEST(TileSampler, LuminanceIsTheMeanOverThePixel) {
+  const Place place;
+  VisibleTriangles visible(place.prepared, place.rays, kSize, place.tiles);
+  ThreadPool pool(1);
+  const SceneView at = place.view(0);
+  visible.find(at, at, pool);
+  TileSampler sampler(place.prepared, place.rays, kSize);
+  TileSamples samples;
+  constexpr int kSide = 24;
+  double sum = 0, of_borders = 0;
+  int pixels = 0, borders = 0;
+  for (std::size_t k = 0; k < place.tiles.size(); ++k) {
+    const Tile& tile = place.tiles[k];
+    const TilePlan plan{tile, visible.of_tile(k), {}};
+    sampler.set_plan(plan);
+    sampler.sample(at, samples);
+    for (int y = 0; y < tile.height; ++y) {
+      for (int x = 0; x < tile.width; ++x) {
+        const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
+        double wanted = 0;
+        for (int n = 0; n < kSide * kSide; ++n) {
+          const float dx = (static_cast<float>(n % kSide) + 0.5F) / kSide - 0.5F,
+                      dy = (static_cast<float>(n / kSide) + 0.5F) / kSide - 0.5F;
+          const PixelRay& ray = sampler.ray(i);
+          const auto hit =
+              place.prepared.rays.trace(at.T_map_cam.p, at.R_map_cam * ray.direction(dx, dy).cast<double>());
+          if (!hit) {
+            wanted += place.scene.sky_cd_m2;
+            continue;
+          }
+          const PatchView patch = make_patch_view(at, place.prepared.patch_of(*hit), -1);
+          wanted += static_cast<double>(luminance(place.prepared, at, patch, ray, dx, dy));
+        }
+        const double error = std::abs(samples.luminance[i] - wanted / (kSide * kSide));
+        sum += error;
+        ++pixels;
+        if (samples.border[i] >= 0 && samples.borders[samples.border[i]].other != kMany) {
+          of_borders += error;
+          ++borders;
+        }
+      }
+    }
+  }
+  EXPECT_GT(borders, 300);
+  EXPECT_LT(of_borders / borders, 0.012);
+  EXPECT_LT(sum / pixels, 0.006);  // things smaller than a pixel may lie between its corners
+}
+
+// Eight directions at once have the luminance of each, with texture and two channels of light.
+TEST(SceneView, LuminanceOfEightIsThatOfEach) {
+  TestScene plain;
+  plain.add({2, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.8);
+  plain.scene.materials.back().texture = std::make_shared<const Texture>(
+      0.5, 0.5, 0.01, [](double u, double v) { return 0.5 + 0.4 * std::sin(25 * u) * std::sin(25 * v); });
+  Light lamp = plain.scene.lights[0];
+  lamp.kind = LightKind::lamp;
+  lamp.strength = 50;
+  lamp.position = {0, 0.5, 0};
+  lamp.switching.flicker_hz = 100;
+  lamp.switching.flicker_depth = 0.3;
+  plain.scene.lights.push_back(lamp);
+  ThreadPool pool(1);
+  const PreparedScene prepared(plain.scene, pool);
+  ASSERT_EQ(prepared.channels.switching.size(), 2U);
+  const SceneView view = make_scene_view(prepared, 0.0021, looking_along_x({0.5, 0.1, 0.2}));
+  const PatchView patch = make_patch_view(view, prepared.still.patches[0], -1);
+  Random random(2);
+  for (int trial = 0; trial < 500; ++trial) {
+    RayAreas<FloatLanes> areas;
+    std::array<RayAreas<float>, kLanes> each;
+    for (int i = 0; i < kLanes; ++i) {
+      const auto any = [&](double most) { return static_cast<float>(random.uniform(-most, most)); };
+      each[i] = {any(0.6), any(0.6), any(0.01), any(0.002), any(0.002), any(0.01)};
+      areas.x[i] = each[i].x, areas.y[i] = each[i].y;
+      areas.column_x[i] = each[i].column_x, areas.column_y[i] = each[i].column_y;
+      areas.row_x[i] = each[i].row_x, areas.row_y[i] = each[i].row_y;
+    }
+    const FloatLanes together = luminance(prepared, view, patch, areas);
+    for (int i = 0; i < kLanes; ++i)
+      ASSERT_EQ(static_cast<float>(together[i]), luminance(prepared, view, patch, each[i]));
+  }
+}
+
+}  // namespace
+}  // namespace evpose::sim

@@ -82,6 +82,9 @@ class Simulate(unittest.TestCase):
                      "trajectory.size_up_m=0.1")
         self.refused("events.threshold_on", "events.threshold_on=-0.2")
         self.refused("px/s", "integrator.max_flow_px_s=2")
+        self.refused("events.preset", "events.preset=dvs128")
+        self.refused("handed_over.preset", "handed_over.preset=perfect")
+        self.refused("lidar.moved_furniture", "lidar.on=true", "lidar.moved_furniture=3")
         self.refused("events.treshold_on", "events.treshold_on=0.2")
         self.refused("do not fit", "frames.rate_hz=30", "frames.exposure_ms=50")
 

@@ -74,6 +74,16 @@ void draw_events(Drawer& d, const Plan& plan, Draw& out) {
   d.set_log_uniform("events.hot_pixel_fraction", 1e-5, 2e-4);
 }
 
+/// Of those that the sensor's maker builds in, now and then one.
+void draw_filters(Drawer& d, Draw& out) {
+  if (!d.chance(0.15)) return;
+  constexpr std::array<Choice, 3> kTrails{{{"first", 0.5}, {"second", 0.25}, {"all_but_first", 0.25}}};
+  const char* trail = d.pick<Choice>(kTrails).word;
+  d.set("read_out.trail", trail);
+  d.set_log_uniform("read_out.trail_ms", 1, 20);
+  out.sensors += text(", filter ", trail);
+}
+
 void draw_imu(Drawer& d, Draw& out) {
   const char* preset = d.chance(0.6) ? "pixhawk" : "adis";
   constexpr std::array<Choice, 3> kRates{{{"200", 0.5}, {"400", 0.3}, {"1000", 0.2}}};
@@ -170,12 +180,15 @@ Draw draw_flight(int seed, int attempt, bool quick) {
   kind.set("duration_s", plan.duration_s);
   Drawer world = part(Part::world), light = part(Part::light), motion = part(Part::motion),
          camera = part(Part::camera), events = part(Part::events), imu = part(Part::imu),
-         calibration = part(Part::calibration), map = part(Part::map);
+         calibration = part(Part::calibration), map = part(Part::map), looks = part(Part::looks),
+         filters = part(Part::filters);
   draw_world(world, plan, out);
+  draw_looks(looks, plan, out);
   draw_light(light, plan, out);
   draw_motion(motion, plan, out);
   draw_camera(camera, plan, out);
   draw_events(events, plan, out);
+  draw_filters(filters, out);
   draw_imu(imu, out);
   draw_map(map, plan, out);
   draw_map_faults(map, out);

@@ -55,6 +55,21 @@ void draw_world(Drawer& d, Plan& plan, Draw& out) {
   draw_movers(d, plan, out);
 }
 
+void draw_looks(Drawer& d, const Plan& plan, Draw& out) {
+  const std::string_view kind = plan.place.kind;
+  if (kind != "hall" && d.chance(0.25)) {
+    d.set("world.repeated_facades", "true");
+    out.scene += ", windows alike";
+  }
+  if (d.chance(0.2)) {
+    const double mirror = d.log_uniform(0.02, 0.12);
+    d.set("world.mirror", mirror);
+    out.scene += text(", mirrors ", number(mirror, 2));
+  }
+  constexpr std::array<Choice, 4> kMarks{{{"none", 1}, {"h", 1}, {"ring", 1}, {"squares", 1}}};
+  if (kind == "courtyard") d.set("world.pad_mark", d.pick<Choice>(kMarks).word);
+}
+
 void draw_light(Drawer& d, Plan& plan, Draw& out) {
   if (std::string_view(plan.place.kind) == "hall") {
     const double lux = d.log_uniform(100, 1000);

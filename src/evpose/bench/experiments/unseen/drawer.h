@@ -13,7 +13,20 @@
 namespace evpose::experiments::unseen {
 
 /// Each part of a draw has random numbers of its own: a change of one leaves the others as they were.
-enum class Part : std::uint64_t { kind, world, light, motion, camera, events, imu, calibration, map, seeds };
+enum class Part : std::uint64_t {
+  kind,
+  world,
+  light,
+  motion,
+  camera,
+  events,
+  imu,
+  calibration,
+  map,
+  seeds,
+  looks,
+  filters
+};
 
 /// A number with so many significant digits.
 std::string number(double value, int digits = 4);
@@ -95,6 +108,8 @@ Place draw_place(Drawer& d);
 /// Where the canyon's stretch lies, m along x.
 double draw_street_x(Drawer& d);
 void draw_world(Drawer& d, Plan& plan, Draw& out);
+/// What deceives: windows all alike, mirrors; and the pad's mark.
+void draw_looks(Drawer& d, const Plan& plan, Draw& out);
 void draw_light(Drawer& d, Plan& plan, Draw& out);
 void draw_motion(Drawer& d, Plan& plan, Draw& out);
 

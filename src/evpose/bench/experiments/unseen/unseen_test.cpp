@@ -113,6 +113,33 @@ TEST(UnseenDraw, VolumesOfFlightLieInTheHallsFreeSpace) {
   }
 }
 
+TEST(UnseenDraw, MapsFiltersAndCalibrationsHaveTheirFaults) {
+  int drift = 0, missing = 0, moved = 0, trails = 0, presets = 0, mirrors = 0;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    const sim::Scenario s = scenario(seed);
+    drift += s.lidar.registration_drift_mm_per_10m > 0 ? 1 : 0;
+    missing += s.lidar.missing_parts > 0 ? 1 : 0;
+    moved += s.lidar.moved_furniture > 0 ? 1 : 0;
+    trails += s.read_out.trail != sim::TrailFilterKind::none ? 1 : 0;
+    presets += s.events.preset != sim::EventSensorPreset::typical ? 1 : 0;
+    mirrors += s.world.mirror > 0 ? 1 : 0;
+    EXPECT_TRUE(s.lidar.on);
+    EXPECT_GE(s.handed_over.focal_sigma, 0.0015);
+    EXPECT_LE(s.handed_over.focal_sigma, 0.003);
+    EXPECT_GE(s.handed_over.time_sigma_ms, 1);
+    EXPECT_LE(s.handed_over.time_sigma_ms, 2);
+  }
+  const auto share = [](int count, double probability) {
+    EXPECT_NEAR(count, probability * kDraws, 4 * std::sqrt(probability * (1 - probability) * kDraws));
+  };
+  share(drift, 0.5);
+  share(missing, 0.4);
+  share(moved, 0.4);
+  share(trails, 0.15);
+  share(presets, 0.5);
+  share(mirrors, 0.2);
+}
+
 TEST(UnseenDraw, QuickOnesAreSmall) {
   const sim::Scenario s = scenario(3, true);
   EXPECT_EQ(s.duration_s, 1);

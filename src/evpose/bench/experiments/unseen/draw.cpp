@@ -53,6 +53,13 @@ void draw_camera(Drawer& d, Plan& plan, Draw& out) {
       text(width, "x", height, ", ", number(across_deg, 2), " deg", k1 == 0 ? ", no distortion" : "");
 }
 
+void draw_vignetting(Drawer& d, Draw& out) {
+  if (!d.chance(0.5)) return;
+  const double share = d.uniform(0.1, 0.6);
+  d.set("camera.vignetting", share);
+  out.camera += text(", corners ", number(100 * share, 2), " % darker");
+}
+
 void draw_events(Drawer& d, const Plan& plan, Draw& out) {
   const double on = d.log_uniform(0.15, 0.4);
   d.set("events.threshold_on", on);
@@ -181,12 +188,13 @@ Draw draw_flight(int seed, int attempt, bool quick) {
   Drawer world = part(Part::world), light = part(Part::light), motion = part(Part::motion),
          camera = part(Part::camera), events = part(Part::events), imu = part(Part::imu),
          calibration = part(Part::calibration), map = part(Part::map), looks = part(Part::looks),
-         filters = part(Part::filters);
+         filters = part(Part::filters), optics = part(Part::optics);
   draw_world(world, plan, out);
   draw_looks(looks, plan, out);
   draw_light(light, plan, out);
   draw_motion(motion, plan, out);
   draw_camera(camera, plan, out);
+  draw_vignetting(optics, out);
   draw_events(events, plan, out);
   draw_filters(filters, out);
   draw_imu(imu, out);

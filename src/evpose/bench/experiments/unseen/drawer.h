@@ -25,7 +25,8 @@ enum class Part : std::uint64_t {
   map,
   seeds,
   looks,
-  filters
+  filters,
+  optics
 };
 
 /// A number with so many significant digits.

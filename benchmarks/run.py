@@ -35,6 +35,7 @@ BENCHMARKS = {
     "performance": ("performance", "make", "kernels and decoders by themselves (evpose_microbench)", "10 min"),
     "live": ("live", "make", "delay of evpose serve", "1 min"),
     "soak": ("live", "make_soak", "memory of evpose serve over half an hour", "30 min"),
+    "simulator-speed": ("simulator_speed", "make", "processor time of the simulator", "5 min"),
     "simulator-peer": ("simulator_peer", "make", "the simulator beside an independent one; its pictures", "10 min"),
     "update-picture": ("pictures", "make_update", "docs/images/update.svg, overlay.png", "10 s"),
     "error-picture": ("error_picture", "make", "docs/images/fusion_error.svg", "10 s"),

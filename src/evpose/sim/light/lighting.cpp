@@ -4,9 +4,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "evpose/core/parallel.h"
 
@@ -83,7 +85,7 @@ class LightBaker {
       const Eigen::Vector3d direction = -light.direction + at.x() * basis.a + at.y() * basis.b;
       segments[i] = {direction.cast<float>(), kRayOffset_m, std::numeric_limits<float>::infinity()};
     }
-    return static_cast<double>(rays_.count_free(point, segments)) / kShadowRays;
+    return visible(point, segments);
   }
 
   double lamp_visibility(const Eigen::Vector3d& point, const Light& light) const {
@@ -97,7 +99,7 @@ class LightBaker {
       const float end = 1 - std::min(0.5F, (static_cast<float>(light.radius) + 0.02F) / length);
       segments[i] = {direction.cast<float>(), kRayOffset_m / length, end};
     }
-    return static_cast<double>(rays_.count_free(point, segments)) / kShadowRays;
+    return visible(point, segments);
   }
 
   double ambient_visibility(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
@@ -109,7 +111,16 @@ class LightBaker {
           at.x() * basis.a + at.y() * basis.b + std::sqrt(std::max(0.0, 1 - at.squaredNorm())) * normal;
       segments[i] = {direction.cast<float>(), kRayOffset_m, static_cast<float>(kOcclusionReach_m)};
     }
-    return static_cast<double>(rays_.count_free(point, segments)) / kAmbientRays;
+    return visible(point, segments);
+  }
+
+  // Fraction of the segments that nothing blocks.
+  double visible(const Eigen::Vector3d& point, std::span<const RayCaster::Segment> segments) const {
+    int free = 0;
+    for (std::size_t i = 0; i < segments.size(); i += RayCaster::kMostSegments)
+      free += std::popcount(rays_.free_segments(
+          point, segments.subspan(i, std::min(RayCaster::kMostSegments, segments.size() - i))));
+    return static_cast<double>(free) / static_cast<double>(segments.size());
   }
 
   const RayCaster& rays_;

@@ -150,33 +150,28 @@ void RayCaster::trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen
   }
 }
 
-int RayCaster::count_free(const Eigen::Vector3d& origin, std::span<const Segment> segments) const {
-  constexpr std::size_t kWide = 8;
+unsigned RayCaster::free_segments(const Eigen::Vector3d& origin, std::span<const Segment> segments) const {
+  EVPOSE_CHECK(segments.size() <= kMostSegments);
   const Eigen::Vector3f from = origin.cast<float>();
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  int free = 0;
-  for (std::size_t first = 0; first < segments.size(); first += kWide) {
-    const std::size_t n = std::min(kWide, segments.size() - first);
-    RTCRay8 rays{};
-    alignas(32) std::array<int, kWide> valid{};
-    for (std::size_t i = 0; i < n; ++i) {
-      const Segment& segment = segments[first + i];
-      valid[i] = -1;
-      rays.org_x[i] = from.x();
-      rays.org_y[i] = from.y();
-      rays.org_z[i] = from.z();
-      rays.dir_x[i] = segment.direction.x();
-      rays.dir_y[i] = segment.direction.y();
-      rays.dir_z[i] = segment.direction.z();
-      rays.tnear[i] = segment.near;
-      rays.tfar[i] = segment.far;
-      rays.mask[i] = ~0u;
-    }
-    rtcOccluded8(valid.data(), impl_->still.get(), &context, &rays);
-    for (std::size_t i = 0; i < n; ++i) free += !(rays.tfar[i] < 0);
+  RTCRay8 rays{};
+  alignas(32) std::array<int, kMostSegments> valid{};
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    valid[i] = -1;
+    rays.org_x[i] = from.x();
+    rays.org_y[i] = from.y();
+    rays.org_z[i] = from.z();
+    rays.dir_x[i] = segments[i].direction.x();
+    rays.dir_y[i] = segments[i].direction.y();
+    rays.dir_z[i] = segments[i].direction.z();
+    rays.tnear[i] = segments[i].near;
+    rays.tfar[i] = segments[i].far;
+    rays.mask[i] = ~0u;
   }
+  rtcOccluded8(valid.data(), impl_->still.get(), &context, &rays);
+  unsigned free = 0;
+  for (std::size_t i = 0; i < segments.size(); ++i) free |= (rays.tfar[i] < 0 ? 0U : 1U) << i;
   return free;
 }
 

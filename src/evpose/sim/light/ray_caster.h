@@ -52,12 +52,14 @@ class RayCaster {
   /// True if a static surface lies in between.
   bool occluded(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near, float far) const;
 
-  /// Number of the segments from one origin that meet no static surface; coherent ones are fast.
   struct Segment {
     Eigen::Vector3f direction;
     float near, far;  ///< in lengths of the direction
   };
-  int count_free(const Eigen::Vector3d& origin, std::span<const Segment> segments) const;
+  /// Which of up to eight segments from one origin meet no static surface: bit i for segment i. Much faster
+  /// than occluded() for each.
+  static constexpr std::size_t kMostSegments = 8;
+  unsigned free_segments(const Eigen::Vector3d& origin, std::span<const Segment> segments) const;
 
   const Scene& scene() const { return scene_; }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -173,9 +174,14 @@ class ContourProber {
       const double fraction = k == 0 ? 0.5 : k == 1 ? 0.2 : 0.8;
       const Eigen::Vector3d from =
           section.point + kRingRadius_m * section.direction(begin + fraction * width);
-      for (std::size_t v = 0; v < candidates.size(); ++v) {
-        if (rays_.occluded(from, candidates[v] - from, 0, 1)) continue;
-        std::swap(candidates[0], candidates[v]);
+      if (!candidates.empty() && !rays_.occluded(from, candidates[0] - from, 0, 1)) return true;
+      for (std::size_t v = 1; v < candidates.size(); v += RayCaster::kMostSegments) {
+        std::array<RayCaster::Segment, RayCaster::kMostSegments> segments;
+        const std::size_t n = std::min(segments.size(), candidates.size() - v);
+        for (std::size_t i = 0; i < n; ++i) segments[i] = {(candidates[v + i] - from).cast<float>(), 0, 1};
+        const unsigned free = rays_.free_segments(from, {segments.data(), n});
+        if (free == 0) continue;
+        std::swap(candidates[0], candidates[v + static_cast<std::size_t>(std::countr_zero(free))]);
         return true;
       }
     }

@@ -36,6 +36,7 @@ void draw_camera(Drawer& d, Plan& plan, Draw& out) {
     k2 = wide ? d.uniform(0.01, 0.025) : d.uniform(0, 0.06);
   }
   const double radius = std::tan(0.5 * kDegree * across_deg), square = radius * radius;
+  plan.edge_radius = radius;
   d.set("camera.size", "custom");
   d.set("camera.width", width);
   d.set("camera.height", height);
@@ -141,15 +142,16 @@ void draw_map_faults(Drawer& d, Draw& out) {
   out.map += text(", ", moved, " moved");
 }
 
-/// Sigmas from half of an ordinary calibration's to all of it.
-void draw_calibration(Drawer& d, Draw& out) {
-  const double share = d.uniform(0.5, 1);
-  const std::array<std::pair<const char*, double>, 9> ordinary{{{"focal_sigma", 0.003},
+/// Sigmas from half of an ordinary calibration's to all of it. What a calibration leaves of k1 is a matter of
+/// pixels: the wider the lens, the less. The other terms are taken as right: errors that are drawn
+/// independently would add up to what no calibration leaves.
+void draw_calibration(Drawer& d, const Plan& plan, Draw& out) {
+  constexpr double kK1Radius = 0.75;  // tangent up to which the sigma of k1 stands
+  const double share = d.uniform(0.5, 1),
+               k1 = 0.01 * std::min(1.0, std::pow(kK1Radius / plan.edge_radius, 3));
+  const std::array<std::pair<const char*, double>, 6> ordinary{{{"focal_sigma", 0.003},
                                                                 {"centre_sigma_px", 1},
-                                                                {"k1_sigma", 0.01},
-                                                                {"k2_sigma", 0.02},
-                                                                {"p1_sigma", 5e-4},
-                                                                {"p2_sigma", 5e-4},
+                                                                {"k1_sigma", k1},
                                                                 {"rotation_sigma_deg", 0.3},
                                                                 {"translation_sigma_mm", 10},
                                                                 {"time_sigma_ms", 2}}};
@@ -200,7 +202,7 @@ Draw draw_flight(int seed, int attempt, bool quick) {
   draw_imu(imu, out);
   draw_map(map, plan, out);
   draw_map_faults(map, out);
-  draw_calibration(calibration, out);
+  draw_calibration(calibration, plan, out);
   return out;
 }
 

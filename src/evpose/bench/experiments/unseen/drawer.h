@@ -100,6 +100,7 @@ struct Plan {
   bool night = false, movers = false, landing = false;
   double street_x_m = 0;  ///< middle of the canyon's stretch
   Chip chip{};
+  double edge_radius = 0;  ///< tangent of half the angle across
 };
 
 // Each draws one part: its settings, and what of it concerns the others. Place before light and motion, and

@@ -126,6 +126,8 @@ TEST(UnseenDraw, MapsFiltersAndCalibrationsHaveTheirFaults) {
     EXPECT_TRUE(s.lidar.on);
     EXPECT_GE(s.handed_over.focal_sigma, 0.0015);
     EXPECT_LE(s.handed_over.focal_sigma, 0.003);
+    EXPECT_GE(s.handed_over.k1_sigma, 0.0015);
+    EXPECT_LE(s.handed_over.k1_sigma, 0.01);
     EXPECT_GE(s.handed_over.time_sigma_ms, 1);
     EXPECT_LE(s.handed_over.time_sigma_ms, 2);
   }

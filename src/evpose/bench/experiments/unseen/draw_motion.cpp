@@ -50,11 +50,15 @@ void place_volume(Drawer& d, const FreeSpace& free, double heading_deg, Vector3d
   d.set("trajectory.size_up_m", size.z());
 }
 
+/// By its acceleration, which is what autopilots limit: 30 m/s^2 is the most that they take for sound.
 void draw_vibration(Drawer& d) {
+  constexpr double kMost_mm = 0.4;
   if (!d.chance(0.4)) return;
-  d.set_log_uniform("trajectory.vibration_mm", 0.03, 0.4);
-  d.set_log_uniform("trajectory.vibration_deg", 0.005, 0.05);
-  d.set_uniform("trajectory.vibration_hz", 20, 150);
+  const double acceleration_m_s2 = d.log_uniform(1, 25), rate_deg_s = d.log_uniform(1, 15),
+               frequency_hz = d.uniform(20, 150), omega = 2 * std::numbers::pi * frequency_hz;
+  d.set("trajectory.vibration_mm", std::min(kMost_mm, 1e3 * acceleration_m_s2 / (omega * omega)));
+  d.set("trajectory.vibration_deg", rate_deg_s / omega);
+  d.set("trajectory.vibration_hz", frequency_hz);
 }
 
 void draw_landing(Drawer& d, Draw& out, Plan& plan) {

@@ -150,13 +150,15 @@ Status RecordingMaker::write_motion_and_calibration(const Trajectory& trajectory
   camera.T_cam_imu = body_cam.inverse();
   camera.has_timeshift = true;
   camera.timeshift_cam_imu_s = scenario_.imu.time_offset_s;
+  // Poses are on the clock of the IMU, as those of the tracker are.
+  const TimeNs delay = from_seconds(scenario_.imu.time_offset_s);
   std::vector<TimedPose> body, cam;
   for (std::int64_t k = 0;; ++k) {
     const TimeNs t = from_seconds(static_cast<double>(k) / scenario_.truth.rate_hz);
     if (t > end) break;
     const Pose pose = trajectory.at(to_seconds(t)).T_map_body;
-    body.push_back({t, pose});
-    cam.push_back({t, pose * body_cam});
+    body.push_back({t + delay, pose});
+    cam.push_back({t + delay, pose * body_cam});
   }
   Scenario all = scenario_;
   ConfigTable table;

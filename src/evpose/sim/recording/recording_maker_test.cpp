@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "evpose/io/files/test_files.h"
+#include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/io/recording/recording.h"
 
 namespace evpose::sim {
@@ -77,6 +78,21 @@ class MakeRecording : public ::testing::Test {
   fs::path folder_;
   Scenario scenario_;
 };
+
+TEST_F(MakeRecording, PosesAreOnTheClockOfTheImu) {
+  ASSERT_TRUE(make("on_time").ok());
+  scenario_.imu.time_offset_s = 0.004;
+  ASSERT_TRUE(make("late").ok());
+  for (const char* file : {"groundtruth.tum", "groundtruth_camera.tum"}) {
+    const auto on_time = read_tum(place("on_time") + "/" + file), late = read_tum(place("late") + "/" + file);
+    ASSERT_TRUE(on_time.ok() && late.ok());
+    ASSERT_EQ(on_time->size(), late->size());
+    for (std::size_t i = 0; i < late->size(); ++i) {
+      EXPECT_EQ((*late)[i].t, (*on_time)[i].t + 4 * kNsPerMs);
+      EXPECT_EQ((*late)[i].pose.p, (*on_time)[i].pose.p);
+    }
+  }
+}
 
 TEST_F(MakeRecording, GivesTheSameBytesForAnyNumberOfThreads) {
   const auto one = make("one", 1);

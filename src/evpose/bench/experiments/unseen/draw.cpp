@@ -98,6 +98,7 @@ void draw_imu(Drawer& d, Draw& out) {
   const char* rate = d.pick<Choice>(kRates).word;
   d.set("imu.preset", preset);
   d.set("imu.rate_hz", rate);
+  if (d.chance(0.5)) d.set_uniform("imu.time_offset_s", -0.005, 0.005);
   out.sensors += text(", IMU ", preset, " ", rate, " Hz");
 }
 

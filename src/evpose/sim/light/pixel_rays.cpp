@@ -6,8 +6,9 @@
 
 namespace evpose::sim {
 
-Expected<std::vector<PixelRay>> pixel_rays(const Camera& camera) {
-  constexpr double kFlattest = 0.0175;  // cosine of 89 degrees
+Expected<std::vector<PixelRay>> pixel_rays(const Camera& camera, double blur_px) {
+  constexpr double kFlattest = 0.0175;                         // cosine of 89 degrees
+  const double width = std::sqrt(1 + 12 * blur_px * blur_px);  // a box of width w has the variance w^2 / 12
   const ImageSize size = camera.size();
   std::vector<PixelRay> rays;
   rays.reserve(static_cast<std::size_t>(size.width) * size.height);
@@ -20,8 +21,9 @@ Expected<std::vector<PixelRay>> pixel_rays(const Camera& camera) {
   };
   for (int y = 0; y < size.height && seen; ++y) {
     for (int x = 0; x < size.width; ++x) {
-      rays.push_back({along(x, y).cast<float>(), (along(x + 0.5, y) - along(x - 0.5, y)).cast<float>(),
-                      (along(x, y + 0.5) - along(x, y - 0.5)).cast<float>()});
+      rays.push_back(
+          {along(x, y).cast<float>(), (width * (along(x + 0.5, y) - along(x - 0.5, y))).cast<float>(),
+           (width * (along(x, y + 0.5) - along(x, y - 0.5))).cast<float>(), static_cast<float>(width)});
     }
   }
   if (!seen)

@@ -103,13 +103,38 @@ std::array<TileSampler::Hit, kLanes> TileSampler::hits_along(
   return hits;
 }
 
-// Asks for the luminance along scan lines, with the borders found by bisection. Lanes 0 to 3 are the first
-// halves of the lines, 4 to 7 the second.
+TileSampler::Hits TileSampler::wide_hits_of(std::size_t pixel) {
+  std::array<Eigen::Vector2f, kLanes> at;
+  for (int i = 0; i < kLanes; ++i) {
+    const float far = i < 4 ? 0.5F : 0.25F;
+    at[i] = {i % 2 == 0 ? -far : far, i % 4 < 2 ? -far : far};
+  }
+  const auto found = hits_along(ray(pixel), at);
+  Hits hits;
+  hits[0] = hit_at(pixel);
+  std::copy_n(found.begin(), 4, hits.begin() + 1);
+  between_.assign(found.begin() + 4, found.end());
+  return hits;
+}
+
+// Asks for the luminance along scan lines, which run across the borders. The lines of a widened pixel have
+// two parts each.
 void TileSampler::want_scan_lines(std::size_t pixel, const Hits& hits) {
-  const PixelRay& r = ray(pixel);
-  // Scan lines run across the borders.
   const bool across_columns = hits[1].group != hits[2].group || hits[3].group != hits[4].group ||
                               (hits[1].group == hits[3].group && hits[2].group == hits[4].group);
+  if (is_wide()) {
+    scan(pixel, across_columns, -0.5F, 0);
+    scan(pixel, across_columns, 0, 0.5F);
+  } else {
+    scan(pixel, across_columns, -0.5F, 0.5F);
+  }
+}
+
+// Finds the borders on a part of each scan line by bisection. Lanes 0 to 3 are the first halves of the parts,
+// 4 to 7 the second.
+void TileSampler::scan(std::size_t pixel, bool across_columns, float begin, float end) {
+  const PixelRay& r = ray(pixel);
+  const float half = 0.5F * (begin + end);
   const auto place = [&](int line, float along) {
     const float fixed = (static_cast<float>(line) + 0.5F) / kScanLines - 0.5F;
     return across_columns ? Eigen::Vector2f(along, fixed) : Eigen::Vector2f(fixed, along);
@@ -120,10 +145,11 @@ void TileSampler::want_scan_lines(std::size_t pixel, const Hits& hits) {
     for (int i = 0; i < kLanes; ++i) at[i] = place(i % kScanLines, along(i));
     return hits_along(r, at);
   };
-  const auto starts = hits_at([](int i) { return i < kScanLines ? -0.5F : 0.0F; });
-  const auto ends = hits_at([](int i) { return i < kScanLines ? 0.0F : 0.5F; });
   std::array<float, kLanes> low, high;
-  for (int i = 0; i < kLanes; ++i) low[i] = i < kScanLines ? -0.5F : 0.0F, high[i] = low[i] + 0.5F;
+  for (int i = 0; i < kLanes; ++i)
+    low[i] = i < kScanLines ? begin : half, high[i] = i < kScanLines ? half : end;
+  const auto starts = hits_at([&](int i) { return low[i]; });
+  const auto ends = hits_at([&](int i) { return high[i]; });
   for (int k = 0; k < kBisections; ++k) {
     const auto middle = hits_at([&](int i) { return 0.5F * (low[i] + high[i]); });
     for (int i = 0; i < kLanes; ++i)
@@ -136,7 +162,7 @@ void TileSampler::want_scan_lines(std::size_t pixel, const Hits& hits) {
   };
   for (int line = 0; line < kScanLines; ++line) {
     const Hit* left = &starts[line];
-    float from = -0.5F;
+    float from = begin;
     for (const int i : {line, line + kScanLines}) {
       if (ends[i].group == left->group) continue;
       const float border = 0.5F * (low[i] + high[i]);
@@ -144,7 +170,7 @@ void TileSampler::want_scan_lines(std::size_t pixel, const Hits& hits) {
       from = border;
       left = &ends[i];
     }
-    add(line, *left, from, 0.5F);
+    add(line, *left, from, end);
   }
 }
 
@@ -188,13 +214,19 @@ void TileSampler::want_sides(std::size_t pixel, const Hits& hits, BorderSample& 
 void TileSampler::sample_border(std::size_t pixel, TileSamples& out) {
   const PixelRay& r = ray(pixel);
   find_movers(pixel);
-  const Hits hits = hits_of(pixel);
+  between_.clear();
+  const Hits hits = is_wide() ? wide_hits_of(pixel) : hits_of(pixel);
   BorderSample border;
   bool moving = false, outline = false;
   for (int i = 0; i < 5; ++i) {
     moving = moving || hits[i].part >= 0;
     if (hits[i].group == hits[0].group || hits[i].group == border.other) continue;
     border.other = border.other == kNone ? hits[i].group : kMany;
+  }
+  for (const Hit& hit : between_) {
+    moving = moving || hit.part >= 0;
+    outline = outline || is_geometric_edge(hits[0], hit, r);
+    if (hit.group != hits[0].group && hit.group != border.other) border.other = kMany;
   }
   set_centre(hits[0], pixel, out);
   if (border.other == kNone) {

@@ -162,8 +162,8 @@ void TileSampler::sample_pixels(TileSamples& out) {
     for (int x = 0; x < plan_->tile.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * kTilePx + x;
       const auto corners = corner_places(pixel);
-      const bool inside = std::all_of(corners.begin(), corners.end(),
-                                      [&](std::size_t c) { return group[c] == group[pixel]; });
+      const bool inside = !is_wide() && std::all_of(corners.begin(), corners.end(),
+                                                    [&](std::size_t c) { return group[c] == group[pixel]; });
       if (inside && (moved_.empty() || !find_movers(pixel))) {
         sample_inside(pixel, out);
       } else {

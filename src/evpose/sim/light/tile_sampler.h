@@ -78,6 +78,8 @@ class TileSampler {
     float fraction;  ///< of the pixel that the group fills
   };
 
+  /// Areas of pixels overlap: their corners are not those of the raster.
+  bool is_wide() const { return rays_[0].width > 1; }
   Hit hit_of(std::int32_t shape, float x, float y) const;
   void add_movers(float x, float y, Hit& hit) const;
   void trace_movers();
@@ -89,9 +91,11 @@ class TileSampler {
   void sample_inside(std::size_t pixel, TileSamples& out);
   void sample_border(std::size_t pixel, TileSamples& out);
   Hits hits_of(std::size_t pixel) const;
+  Hits wide_hits_of(std::size_t pixel);
   std::size_t want(const Hit& hit, std::size_t pixel, float x, float y);
   void want_sides(std::size_t pixel, const Hits& hits, BorderSample& border);
   void want_scan_lines(std::size_t pixel, const Hits& hits);
+  void scan(std::size_t pixel, bool across_columns, float begin, float end);
   std::array<Hit, kLanes> hits_along(const PixelRay& ray,
                                      const std::array<Eigen::Vector2f, kLanes>& at) const;
   bool fit_border(const PixelRay& ray, const Hits& hits, std::int32_t group, BorderSample& out) const;
@@ -110,6 +114,7 @@ class TileSampler {
   std::vector<std::int32_t> numbers_;  ///< in the queue, of each shape
   std::vector<int> movers_;            ///< moving parts that may cover the current pixel
   std::vector<Hit> moved_;             ///< at all places; empty: nothing moves here
+  std::vector<Hit> between_;           ///< of a widened pixel: half-way to its corners
   std::vector<Pending> pending_;
   std::vector<Side> sides_;
 };

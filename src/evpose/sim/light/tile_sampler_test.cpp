@@ -33,12 +33,12 @@ Scene cluttered() {
 }
 
 struct Place {
-  Place()
+  explicit Place(double blur_px = 0, Scene of = cluttered())
       : pool(1),
-        scene(cluttered()),
+        scene(std::move(of)),
         prepared(scene, pool),
         camera(test_camera(kSize.width, kSize.height, 50)) {
-    rays = *pixel_rays(*camera);
+    rays = *pixel_rays(*camera, blur_px);
     for (int y = 0; y < kSize.height; y += kTilePx)
       for (int x = 0; x < kSize.width; x += kTilePx)
         tiles.push_back({x, y, std::min(kTilePx, kSize.width - x), std::min(kTilePx, kSize.height - y)});
@@ -94,8 +94,8 @@ TEST(TileRaster, SeesWhatRaysSee) {
 }
 
 // The luminance of a pixel is its mean over many rays.
-TEST(TileSampler, LuminanceIsTheMeanOverThePixel) {
-  const Place place;
+void expect_mean_of_rays(double blur_px) {
+  const Place place(blur_px);
   VisibleTriangles visible(place.prepared, place.rays, kSize, place.tiles);
   ThreadPool pool(1);
   const SceneView at = place.view(0);
@@ -140,6 +140,55 @@ TEST(TileSampler, LuminanceIsTheMeanOverThePixel) {
   EXPECT_GT(borders, 300);
   EXPECT_LT(of_borders / borders, 0.012);
   EXPECT_LT(sum / pixels, 0.006);  // things smaller than a pixel may lie between its corners
+}
+TEST(TileSampler, LuminanceIsTheMeanOverThePixel) { expect_mean_of_rays(0); }
+TEST(TileSampler, BlurredLuminanceIsTheMeanOverTheWiderArea) { expect_mean_of_rays(0.6); }
+
+// The response of a pixel to a step edge, printed or of a thing before a wall, upright or slanted, is a
+// distribution over the place of the edge: it has the variance of the pixel and of the blur.
+TEST(TileSampler, StepResponseHasTheVarianceOfThePixelAndTheBlur) {
+  constexpr double kStep_px = 0.04, kPxPerM = 25;
+  constexpr int kX = 40, kY = 24;
+  for (const double blur_px : {0.0, 0.3, 0.7}) {
+    for (const double wall_m : {2.0, 4.0}) {
+      TestScene plain;
+      plain.add({2, 0, -3}, {0, 0, 6}, {0, 3, 0}, 0.6);
+      plain.add({wall_m, -5, -5}, {0, 0, 10}, {0, wall_m > 2 ? 10.0 : 5.0, 0}, 0.1);
+      const Place place(blur_px, plain.scene);
+      VisibleTriangles visible(place.prepared, place.rays, kSize, place.tiles);
+      ThreadPool pool(1);
+      TileSampler sampler(place.prepared, place.rays, kSize);
+      TileSamples samples;
+      for (const double roll : {0.0, 0.4}) {
+        double last = 0, sum = 0, first = 0, second = 0;
+        // The pixel is off the axis by this, across the edge.
+        const double off_px = std::cos(roll) * (kX - 35.5) - std::sin(roll) * (kY - 27.5);
+        for (int k = -55; k <= 55; ++k) {
+          const double edge_px = kStep_px * k;  // from the pixel
+          Pose pose = looking_along_x({0, (off_px + edge_px) / kPxPerM, 0});
+          pose.q = pose.q * so3::exp({0, 0, roll});
+          const SceneView at = make_scene_view(place.prepared, 0, pose);
+          visible.find(at, at, pool);
+          const std::size_t tile = kY / kTilePx * ((kSize.width + kTilePx - 1) / kTilePx) + kX / kTilePx;
+          const TilePlan plan{place.tiles[tile], visible.of_tile(tile), {}};
+          sampler.set_plan(plan);
+          sampler.sample(at, samples);
+          const double seen = static_cast<double>(samples.luminance[kY % kTilePx * kTilePx + kX % kTilePx]);
+          if (k > -55) {
+            const double middle = edge_px - 0.5 * kStep_px;
+            sum += seen - last;
+            first += (seen - last) * middle;
+            second += (seen - last) * middle * middle;
+          }
+          last = seen;
+        }
+        EXPECT_NEAR(std::abs(sum), 0.5, 1e-4);
+        EXPECT_NEAR(first / sum, 0, 0.01) << blur_px << " " << wall_m << " " << roll;
+        const double variance = second / sum - std::pow(first / sum, 2);
+        EXPECT_NEAR(variance, 1.0 / 12 + blur_px * blur_px, 0.003) << blur_px << " " << wall_m << " " << roll;
+      }
+    }
+  }
 }
 
 // Eight directions at once have the luminance of each, with texture and two channels of light.

@@ -239,7 +239,7 @@ Expected<RecordingCounts> RecordingMaker::make() {
 
   const auto camera = make_camera(intrinsics(scenario_.camera));
   if (!camera) return camera.error();
-  const auto rays = pixel_rays(**camera);
+  const auto rays = pixel_rays(**camera, scenario_.camera.blur_px);
   if (!rays) return rays.error();
   const auto scene = make_scene(scenario_, pool_);
   if (!scene) return scene.error();

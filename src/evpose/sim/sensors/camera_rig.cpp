@@ -81,6 +81,8 @@ void describe(ConfigTable& table, CameraConfig& c) {
   table.add("roll_deg", c.roll_deg, "deg", "about the optical axis", {-180, 180});
   table.add("vignetting", c.vignetting, "", "fraction of the light that the farthest corner lacks",
             {0, 0.95});
+  table.add("blur_px", c.blur_px, "px", "1 sigma of the lens' point image along each axis; 0: sharp",
+            {0, 0.7});
   table.add("forward_m", c.forward_m, "m", "of the lens from the IMU", {-10, 10});
   table.add("left_m", c.left_m, "m", "of the lens from the IMU", {-10, 10});
   table.add("up_m", c.up_m, "m", "of the lens from the IMU", {-10, 10});

@@ -28,7 +28,8 @@ struct CameraConfig {
   double k1 = -0.1, k2 = 0.02, p1 = 5e-4, p2 = -3e-4;                ///< lens distortion, radial-tangential
   double pitch_down_deg = 1.2, yaw_left_deg = -0.8, roll_deg = 1.0;  ///< of the optical axis from +x
   double vignetting =
-      0;  ///< light lost in the corner that is farthest from the principal point, as a fraction
+      0;               ///< light lost in the corner that is farthest from the principal point, as a fraction
+  double blur_px = 0;  ///< 1 sigma of the point image
   double forward_m = 0.045, left_m = 0.025, up_m = -0.04;  ///< of the lens from the IMU
 };
 void describe(ConfigTable& table, CameraConfig& config);

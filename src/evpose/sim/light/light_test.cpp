@@ -132,6 +132,47 @@ TEST(Lighting, AmbientLightFallsTowardsAContactByTheViewOfTheSky) {
   }
 }
 
+// In a large place, whose texels are coarse: shadows of the sun have exact rims near the feet of things, even
+// of a post that no coarse texel sees, and the sky is hidden as exactly as in a small place.
+TEST(Lighting, ShadowsOnLargeGroundsAreSharpAtTheFeetOfThings) {
+  constexpr double kSide = 100, kFloor = 0.6, kPost = 0.06;
+  TestScene test;
+  test.add({-kSide / 2, -kSide / 2, 0}, {kSide, 0, 0}, {0, kSide, 0}, kFloor);
+  TestScene::add_box(test.scene.mesh, {2, -0.5, 0}, {1, 1, 1}, test.material(0.4));
+  TestScene::add_box(test.scene.mesh, {2, 3.013, 0}, {kPost, kPost, 1}, test.material(0.4));
+  Light& sun = test.scene.lights[0];
+  sun.kind = LightKind::sun;
+  sun.strength = std::numbers::pi;
+  sun.radius = 0.005;
+  sun.direction =
+      Eigen::Vector3d(-1, 0, -1).normalized();  // shadows fall towards -x, as long as things are high
+  ThreadPool pool(2);
+  const PreparedScene prepared(test.scene, pool);
+  const LightMap& map = prepared.still.patches[0].light;
+  EXPECT_GE(map.per_metre, 1 / 0.03);
+  const SceneView view = make_scene_view(prepared, 0, looking_along_x({0, 0, 2}));
+  const auto sunlit = [&](double x, double y) {  // fraction
+    const PixelRay ray{{static_cast<float>(-y / x), static_cast<float>(2 / x)}, {1e-5F, 0}, {0, 1e-5F}};
+    return static_cast<double>(
+               luminance(prepared, view, make_patch_view(view, prepared.still.patches[0], -1), ray)) /
+           (kFloor * std::sqrt(0.5));
+  };
+  constexpr double kOff = 0.04;
+  for (const double x : {1.96, 1.9, 1.7, 1.5, 1.2}) {  // beside the shadow of the box, and in it
+    for (const double side : {-1.0, 1.0}) {
+      EXPECT_NEAR(sunlit(x, side * (0.5 + kOff)), 1, 0.02) << x << " " << side;
+      EXPECT_NEAR(sunlit(x, side * (0.5 - kOff)), 0, 0.02) << x << " " << side;
+    }
+  }
+  for (const double x : {1.95, 1.85, 1.7, 1.5, 1.3}) {  // along the shadow of the post
+    EXPECT_LT(sunlit(x, 3.013 + kPost / 2), 0.3) << x;
+    EXPECT_NEAR(sunlit(x, 3.013 - kOff), 1, 0.02) << x;
+    EXPECT_NEAR(sunlit(x, 3.013 + kPost + kOff), 1, 0.02) << x;
+  }
+  EXPECT_NEAR(sunlit(1.0 - kOff, 0), 1, 0.03);  // its end
+  EXPECT_NEAR(sunlit(1.0 + kOff, 0), 0, 0.03);
+}
+
 TEST(Lighting, SwitchingIsAFactorOfTime) {
   LightSwitching s;
   EXPECT_EQ(s.factor(3), 1);

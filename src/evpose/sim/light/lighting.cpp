@@ -11,6 +11,7 @@
 #include <span>
 
 #include "evpose/core/parallel.h"
+#include "evpose/sim/light/light_refinement.h"
 
 namespace evpose::sim {
 namespace {
@@ -20,6 +21,7 @@ constexpr int kAmbientRays = 24;
 constexpr double kOcclusionReach_m = 1.5;  // occluders farther away do not darken ambient light
 constexpr double kTexels = 5e5;            // of a world, about
 constexpr double kFinest_m = 0.02, kCoarsest_m = 0.3;
+constexpr double kFine_m = 0.03;       // at the feet of things and the rims of shadows
 constexpr int kMostTexels = 2048;      // along a side
 constexpr float kRayOffset_m = 2e-3F;  // distance from the surface at which shadow rays start
 constexpr double kInset_m = 4e-3;      // distance from the rim of the surface at which they start
@@ -46,6 +48,9 @@ TangentBasis tangent_basis(const Eigen::Vector3d& n) {
 class LightBaker {
  public:
   LightBaker(const RayCaster& rays, const LightChannels& channels) : rays_(rays), channels_(channels) {}
+
+  const Mesh& mesh() const { return rays_.scene().mesh; }
+  std::size_t channels() const { return channels_.switching.size(); }
 
   void illuminance_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, float* by_channel) const {
     const Scene& scene = rays_.scene();
@@ -214,6 +219,51 @@ void set_grid(const std::vector<FlatTriangle>& flat, double texel_m, LightMap& m
   map.up0 = low.y();
 }
 
+// Computes one texel of the light map of a patch.
+void bake_texel(const LightBaker& baker, const std::vector<FlatTriangle>& flat, Patch& patch, std::size_t i) {
+  LightMap& map = patch.light;
+  const std::size_t column = i % map.columns, row = i / map.columns;
+  const PatchPoint nearest = nearest_point(flat, {map.right0 + static_cast<double>(column) / map.per_metre,
+                                                  map.up0 + static_cast<double>(row) / map.per_metre});
+  const Eigen::Vector3d point =
+      nearest.at.x() * map.right + nearest.at.y() * map.up - patch.offset * patch.normal;
+  std::vector<float> light(baker.channels());
+  baker.illuminance_at(point, nearest.normal, light.data());
+  const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows;
+  for (std::size_t c = 0; c < light.size(); ++c) map.values[c * texels + i] = light[c];
+}
+
+// The cells that corners of things touch.
+void want_feet(const Mesh& mesh, const Patch& patch, LightRefinement& finer) {
+  for (const Eigen::Vector3f& vertex : mesh.vertices) {
+    const Eigen::Vector3d p = vertex.cast<double>();
+    if (std::abs(patch.normal.dot(p) + patch.offset) < kFine_m)
+      finer.want_cell_at({patch.light.right.dot(p), patch.light.up.dot(p)});
+  }
+}
+
+void refine(const LightBaker& baker, const std::vector<std::vector<FlatTriangle>>& flat,
+            PartSurfaces& surfaces, ThreadPool& pool) {
+  std::vector<LightRefinement> finer;
+  for (Patch& patch : surfaces.patches) finer.emplace_back(patch.light, kFine_m);
+  pool.for_chunks(finer.size(), 1, [&](std::size_t, std::size_t k, std::size_t) {
+    want_feet(baker.mesh(), surfaces.patches[k], finer[k]);
+  });
+  struct Job {
+    std::size_t patch, texel;
+  };
+  std::vector<Job> jobs;
+  do {
+    jobs.clear();
+    for (std::size_t k = 0; k < finer.size(); ++k)
+      for (const std::uint32_t texel : finer[k].next_texels()) jobs.push_back({k, texel});
+    pool.for_chunks(jobs.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        bake_texel(baker, flat[jobs[i].patch], surfaces.patches[jobs[i].patch], jobs[i].texel);
+    });
+  } while (!jobs.empty());
+}
+
 }  // namespace
 
 std::vector<float> LightChannels::factors(double t_s) const {
@@ -253,30 +303,21 @@ void bake_lights(const RayCaster& rays, const LightChannels& channels, PartSurfa
   const double texel_m = std::clamp(std::sqrt(area_of(mesh) / kTexels), kFinest_m, kCoarsest_m);
   std::vector<std::vector<std::size_t>> triangles(surfaces.patches.size());
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) triangles[surfaces.patch_of[i]].push_back(i);
+  std::vector<std::vector<FlatTriangle>> flat(surfaces.patches.size());
   pool.for_chunks(surfaces.patches.size(), 1, [&](std::size_t, std::size_t begin, std::size_t end) {
-    std::vector<float> light(channels.switching.size());
     for (std::size_t k = begin; k < end; ++k) {
-      Patch& patch = surfaces.patches[k];
-      LightMap& map = patch.light;
-      const TangentBasis basis = tangent_basis(patch.normal);
+      LightMap& map = surfaces.patches[k].light;
+      const TangentBasis basis = tangent_basis(surfaces.patches[k].normal);
       map.right = basis.a;
       map.up = basis.b;
-      const std::vector<FlatTriangle> flat = flatten(mesh, triangles[k], map);
-      set_grid(flat, texel_m, map);
+      flat[k] = flatten(mesh, triangles[k], map);
+      set_grid(flat[k], texel_m, map);
       const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows;
-      map.values.resize(texels * light.size());
-      for (std::size_t i = 0; i < texels; ++i) {
-        const std::size_t column = i % map.columns, row = i / map.columns;
-        const Eigen::Vector2d at(map.right0 + static_cast<double>(column) / map.per_metre,
-                                 map.up0 + static_cast<double>(row) / map.per_metre);
-        const PatchPoint nearest = nearest_point(flat, at);
-        const Eigen::Vector3d point =
-            nearest.at.x() * map.right + nearest.at.y() * map.up - patch.offset * patch.normal;
-        baker.illuminance_at(point, nearest.normal, light.data());
-        for (std::size_t c = 0; c < light.size(); ++c) map.values[c * texels + i] = light[c];
-      }
+      map.values.resize(texels * channels.switching.size());
+      for (std::size_t i = 0; i < texels; ++i) bake_texel(baker, flat[k], surfaces.patches[k], i);
     }
   });
+  if (texel_m > kFine_m) refine(baker, flat, surfaces, pool);
 }
 
 void unoccluded_light(const Scene& scene, const LightChannels& channels, const Eigen::Vector3d& point,

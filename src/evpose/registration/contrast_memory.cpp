@@ -10,12 +10,6 @@ namespace {
 constexpr double kDoubt_px2 = 20;  // of a step of none, or of the map's sign, before anything is seen
 constexpr double kSeedSteps = 1;   // of the threshold, that a map's sign stands for
 
-// Law of the edge delay, as measured in simulated flights: by contrast in steps n of the threshold,
-// min(largest, least + by_contrast / n).
-constexpr double kLeastDelay_px = 0.06;
-constexpr double kDelayByContrast_px = 0.04;
-constexpr double kLargestDelay_px = 0.16;
-
 }  // namespace
 
 ContrastMemory::ContrastMemory(std::uint32_t segments, double threshold)
@@ -48,15 +42,9 @@ double ContrastMemory::steps(std::uint32_t segment) const {
   return s.net / (s.swept_px2 + kDoubt_px2);
 }
 
-ContrastMemory::EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
-  const double n = std::abs(steps(segment));
-  const double delay =
-      measured(segment) ? std::min(kLargestDelay_px, kLeastDelay_px + kDelayByContrast_px / std::max(n, 1e-3))
-                        : kUnknownDelay_px;
-  // Where the logarithm is halfway between both sides, of a pixel's width; s: square root of their ratio.
-  const double s = std::exp(0.5 * n * threshold_);
-  const double towards_dark = 0.5 - 1 / (1 + s);
-  return {delay - towards_dark, delay + towards_dark};
+EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
+  if (!measured(segment)) return {kUnknownDelay_px, kUnknownDelay_px};
+  return evpose::edge_delay(step_of_events(std::abs(steps(segment))), threshold_);
 }
 
 }  // namespace evpose

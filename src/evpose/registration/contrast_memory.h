@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "evpose/registration/edge_delay.h"
+
 namespace evpose {
 
 /// What events have told about the brightness step across each contrast segment of the contours
@@ -32,12 +34,7 @@ class ContrastMemory {
   /// the map's normal points.
   int map_contrast(std::uint32_t segment) const;
 
-  /// How far behind the contour its events lie, px along the motion. Late by a part of a threshold: the pixel
-  /// was on average half a threshold short of its first event. And displaced towards the dark side: a pixel's
-  /// logarithm is halfway when most of it is still dark, so that brightening (on) is early, darkening late.
-  struct EdgeDelay {
-    double on_px, off_px;
-  };
+  /// Of the segment, by the step that events have told of.
   EdgeDelay edge_delay(std::uint32_t segment) const;
 
   static constexpr double kSureSteps = 0.3;         ///< contrast from which on a sign is relied on

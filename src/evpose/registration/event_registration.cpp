@@ -82,10 +82,10 @@ bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) cons
          std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
-ContrastMemory::EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
+EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
   if (!config_.edge_delay) return {0, 0};
   const double fade = std::min(1.0, std::abs(s.speed_px_s) / kFullDelay_px_s);
-  const ContrastMemory::EdgeDelay full = contrast_.edge_delay(s.segment);
+  const EdgeDelay full = contrast_.edge_delay(s.segment);
   return {fade * full.on_px, fade * full.off_px};
 }
 
@@ -96,7 +96,7 @@ EventRegistration::Line EventRegistration::line_of(const ContourSample& s, doubl
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
   const double odds = kContourPrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kContourPrior);
   const int forward = s.speed_px_s > 0 ? 1 : -1;
-  const ContrastMemory::EdgeDelay delay = edge_delay(s);
+  const EdgeDelay delay = edge_delay(s);
   return {static_cast<float>(forward * delay.on_px),
           static_cast<float>(forward * delay.off_px),
           static_cast<float>(gate),

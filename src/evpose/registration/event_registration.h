@@ -58,7 +58,7 @@ class EventRegistration final : public Registration {
   void seed_contrast(std::uint32_t segment, int map_contrast) { contrast_.seed(segment, -map_contrast); }
   const ContrastMemory* contrast() const override { return &contrast_; }
   /// How far behind this contour its events are expected, px along its motion.
-  ContrastMemory::EdgeDelay edge_delay(const ContourSample& sample) const;
+  EdgeDelay edge_delay(const ContourSample& sample) const;
 
  private:
   /// What an event needs to know of the sample that it belongs to.

@@ -135,12 +135,12 @@ TEST(Residuals, TheNoiseOfFewEventsIsNoScatter) {
 }
 
 /// Mean place past the pixel's middle, px along the motion, of the simulated sensor's events at an edge that
-/// brightens by so many thresholds at a speed, after texture of small steps.
+/// brightens or darkens by so many thresholds at a speed, after texture that moved its logarithm to and fro.
 double sensor_delay_px(double steps, double speed_px_s, bool on) {
   sim::EventCameraConfig config;
   config.bandwidth_hz_per_cd_m2 = config.leak_hz = config.threshold_sigma = config.hot_pixel_fraction = 0;
   config.shot_noise_dark_hz = config.shot_noise_bright_hz = 0;
-  constexpr std::size_t kPixels = 3000;
+  constexpr std::size_t kPixels = 2000;
   sim::EventPixels pixels({static_cast<int>(kPixels), 1}, config, 11);
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -157,7 +157,7 @@ double sensor_delay_px(double steps, double speed_px_s, bool on) {
       pixels.advance(i, t, t + span, static_cast<float>(level), static_cast<float>(to), events);
       level = to, t += span;
     };
-    for (int k = 0; k < 200; ++k) go(20 * std::exp(0.15 * std::sin(k) + 0.15 * normal(random)), texture);
+    for (int k = 0; k < 1500; ++k) go(level * std::exp(0.012 * normal(random)), texture);
     events.clear();
     const TimeNs begin = t;
     const double before = level;
@@ -173,7 +173,7 @@ double sensor_delay_px(double steps, double speed_px_s, bool on) {
 
 TEST(EdgeDelayLaw, HoldsForTheSimulatedSensor) {
   for (const double steps : {0.7, 1.5, 3.0, 6.0})
-    for (const double speed_px_s : {20.0, 100.0, 300.0}) {
+    for (const double speed_px_s : {20.0, 300.0}) {
       const EdgeDelay law = edge_delay(steps, 0.25);
       EXPECT_NEAR(sensor_delay_px(steps, speed_px_s, true), law.on_px, 0.03) << steps << ' ' << speed_px_s;
       EXPECT_NEAR(sensor_delay_px(steps, speed_px_s, false), law.off_px, 0.03) << steps << ' ' << speed_px_s;

@@ -112,6 +112,45 @@ TEST(PixelIntegrator, OutlineBeforeAFarWallFiresWhenTheorySays) {
   expect_theory(plain.scene, 0.08, 0.5);
 }
 
+// Across a slanted edge the area grows with the square of the way at first and at last: every event comes
+// within a fiftieth of a pixel of where the area reaches its threshold.
+TEST(PixelIntegrator, SlantedEdgeFiresWhenTheorySays) {
+  for (const double lean : {0.1, 0.4, 0.9}) {
+    TestScene plain;
+    plain.add({2, -lean, -1}, {0, 2 * lean, 2}, {0, 3, 0}, 0.6);
+    plain.add({2, -lean - 3, -1}, {0, 2 * lean, 2}, {0, 3, 0}, 0.1);
+    Shot shot(plain.scene, {0, -0.015, 0}, {0, 0.9, 0});
+    const double px_per_s = kFocal * 0.9 / 2;
+    int count = 0;
+    double sum = 0;
+    for (const auto& [pixel, events] : by_pixel(shot.shoot())) {
+      // Columns by which the edge has passed the centre of the pixel, and the area that it has then covered.
+      const auto passed = [&](double t_s) {
+        return 31.5 + kFocal * -0.015 / 2 + px_per_s * t_s + lean * (pixel.second - 23.5) - pixel.first;
+      };
+      const auto luminance = [&](double way) {
+        return 0.1 + 0.5 * fraction_above(static_cast<float>(way), {1, static_cast<float>(lean)});
+      };
+      const double half = 0.5 * (1 + lean);
+      if (passed(0) > -half || passed(shot.duration_s) < half) continue;
+      ASSERT_EQ(events.size(), 7U);  // ln(6) / 0.25 = 7.2
+      for (int k = 0; k < 7; ++k) {
+        double low = -half, high = half;
+        for (int i = 0; i < 40; ++i) {
+          const double middle = 0.5 * (low + high);
+          (luminance(middle) < 0.1 * std::exp(0.25 * (k + 1)) ? low : high) = middle;
+        }
+        const double error_px = std::abs(passed(to_seconds(events[k].t)) - low);
+        EXPECT_LT(error_px, 0.15) << lean << " " << k;
+        sum += error_px;
+        ++count;
+      }
+    }
+    EXPECT_GT(count, 100);
+    EXPECT_LT(sum / count, 0.01) << lean;
+  }
+}
+
 // Both edges of a dark bar of 1.3 pixels give as many events as go back again.
 TEST(PixelIntegrator, ThinBarComesAndGoes) {
   TestScene plain;

@@ -13,7 +13,7 @@ constexpr double kSeedSteps = 1;   // of the threshold, that a map's sign stands
 }  // namespace
 
 ContrastMemory::ContrastMemory(std::uint32_t segments, double threshold)
-    : threshold_(threshold), segments_(segments) {}
+    : delays_(threshold), segments_(segments) {}
 
 void ContrastMemory::seed(std::uint32_t segment, int sign) {
   if (sign == 0) return;
@@ -44,7 +44,7 @@ double ContrastMemory::steps(std::uint32_t segment) const {
 
 EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
   if (!measured(segment)) return {kUnknownDelay_px, kUnknownDelay_px};
-  return evpose::edge_delay(step_of_events(std::abs(steps(segment))), threshold_);
+  return delays_(step_of_events(std::abs(steps(segment))));
 }
 
 }  // namespace evpose

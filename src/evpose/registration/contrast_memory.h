@@ -47,7 +47,7 @@ class ContrastMemory {
     float net = 0, swept_px2 = 0;
     bool seeded = false;
   };
-  double threshold_;
+  EdgeDelayTable delays_;
   std::vector<Segment> segments_;
 };
 

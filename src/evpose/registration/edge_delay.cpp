@@ -23,7 +23,9 @@ double mean_place(double steps, double threshold, int sign) {
 
 }  // namespace
 
-double expected_events(double n) { return n < 1 ? 0.5 * n * n : n - 0.5; }
+double expected_events(double thresholds) {
+  return thresholds < 1 ? 0.5 * thresholds * thresholds : thresholds - 0.5;
+}
 
 double step_of_events(double events) { return events < 0.5 ? std::sqrt(2 * events) : events + 0.5; }
 
@@ -31,6 +33,20 @@ EdgeDelay edge_delay(double thresholds, double threshold) {
   constexpr double kLeastSteps = 0.05;  // below, rounding counts
   const double steps = std::max(thresholds, kLeastSteps);
   return {mean_place(steps, threshold, 1) - 0.5, mean_place(steps, threshold, -1) - 0.5};
+}
+
+EdgeDelayTable::EdgeDelayTable(double threshold) : threshold_(threshold) {
+  for (std::size_t i = 0; i < values_.size(); ++i)
+    values_[i] = edge_delay(static_cast<double>(i) / kPerThreshold, threshold);
+}
+
+EdgeDelay EdgeDelayTable::operator()(double thresholds) const {
+  const double place = thresholds * kPerThreshold;
+  const auto low = static_cast<std::size_t>(place);
+  if (low + 1 >= values_.size()) return edge_delay(thresholds, threshold_);
+  const double rest = place - static_cast<double>(low);
+  const EdgeDelay &a = values_[low], &b = values_[low + 1];
+  return {a.on_px + rest * (b.on_px - a.on_px), a.off_px + rest * (b.off_px - a.off_px)};
 }
 
 }  // namespace evpose

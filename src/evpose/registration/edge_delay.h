@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+
 namespace evpose {
 
 /// How far behind a contour its events lie on average, px along the contour's motion, by polarity. A pixel
@@ -22,5 +24,17 @@ double step_of_events(double events);
 
 /// `thresholds`: of the step, >= 0; `threshold`: of the camera, in log luminance.
 EdgeDelay edge_delay(double thresholds, double threshold);
+
+/// The same by a table of steps up to kMost thresholds, linear in between: good to 0.001 px.
+class EdgeDelayTable {
+ public:
+  explicit EdgeDelayTable(double threshold);
+  EdgeDelay operator()(double thresholds) const;
+
+ private:
+  static constexpr int kPerThreshold = 16, kMost = 12;
+  double threshold_;
+  std::array<EdgeDelay, kPerThreshold * kMost + 1> values_;
+};
 
 }  // namespace evpose

@@ -83,5 +83,16 @@ TEST(EdgeDelay, IsSmoothWhereTheFirstThresholdIsReached) {
   EXPECT_NEAR(below.off_px, above.off_px, 1e-5);
 }
 
+TEST(EdgeDelay, TheTableHoldsTheClosedForm) {
+  for (const double threshold : {0.1, kThreshold, 0.5}) {
+    const EdgeDelayTable table(threshold);
+    for (double steps = 0; steps < 15; steps += 0.01) {
+      const EdgeDelay read = table(steps), exact = edge_delay(steps, threshold);
+      EXPECT_NEAR(read.on_px, exact.on_px, 1e-3) << steps;
+      EXPECT_NEAR(read.off_px, exact.off_px, 1e-3) << steps;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace evpose

@@ -48,7 +48,7 @@ class Bench:
     # ---- running programs
 
     def run(self, *words):
-        """What evpose prints. It may end with 1 (lost at the end); with 2 there are no figures."""
+        """What evpose prints. It may end with 1 (not tracked well); with 2 there are no figures."""
         done = subprocess.run([str(w) for w in (self.evpose, "-q", *words)], capture_output=True, text=True,
                               stdin=subprocess.DEVNULL)
         if done.returncode not in (0, 1):

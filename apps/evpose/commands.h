@@ -16,7 +16,7 @@ namespace evpose {
 struct RunOutcome;
 
 // Each adds one subcommand, which stores in `run` what is to be done if it was the one asked for. That
-// returns the exit status: 0 done; 1 ran, but the tracker was lost at the end or a check failed; 2 bad input.
+// returns the exit status: 0 done; 1 ran, but tracked too little of it or a check failed; 2 bad input.
 void add_demo(CLI::App& app, std::function<int()>& run);
 void add_simulate(CLI::App& app, std::function<int()>& run);
 void add_track(CLI::App& app, std::function<int()>& run);

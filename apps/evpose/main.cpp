@@ -16,7 +16,7 @@ int run_program(int argc, char** argv) {
   app.set_version_flag("--version", std::string("evpose ") + version());
   app.require_subcommand(1);
   app.footer(
-      "Exit status: 0 done; 1 ran, but the tracker was lost at the end or a check failed; 2 bad input or "
+      "Exit status: 0 done; 1 ran, but less than 90 % of it was tracked or a check failed; 2 bad input or "
       "usage.");
   bool verbose = false, quiet = false;
   app.add_flag("-v,--verbose", verbose, "say more");

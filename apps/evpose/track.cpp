@@ -23,7 +23,7 @@ int dump_config(const TrackRequest& request) {
 int report_run(const Expected<RunOutcome>& outcome) {
   if (!outcome) return bad_input(outcome.error());
   std::printf("%s\n%s\n", outcome->text.c_str(), outcome->report.c_str());
-  return outcome->health == Health::lost ? 1 : 0;
+  return outcome->verdict.good() ? 0 : 1;
 }
 
 void add_track(CLI::App& app, std::function<int()>& run) {

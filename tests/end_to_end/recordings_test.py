@@ -22,7 +22,7 @@ def track(out, recording, *more):
     command = [EVPOSE, "-q", "track", SHARED / "data/peer" / recording, "--map", maps / f"{name}_contours.ply", "-o", out]
     result = subprocess.run([str(word) for word in command + list(more)], capture_output=True, text=True,
                             timeout=300, stdin=subprocess.DEVNULL)
-    if result.returncode != 0:
+    if result.returncode not in (0, 1):  # 1: not tracked well; the figures tell
         raise AssertionError(f"{recording}: status {result.returncode}: {result.stderr}{result.stdout}")
     return json.loads((out / "summary.json").read_text())
 

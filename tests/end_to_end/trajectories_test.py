@@ -31,7 +31,7 @@ def vector_instructions():
 def run(*command):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=600,
                           stdin=subprocess.DEVNULL)
-    if done.returncode != 0:
+    if done.returncode not in (0, 1):  # 1: not tracked well, of small flights
         raise AssertionError(f"{command[:3]}: status {done.returncode}: {done.stderr}{done.stdout}")
 
 

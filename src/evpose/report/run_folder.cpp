@@ -172,9 +172,9 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
   EVPOSE_CHECK(state_ && !state_->finished);
   State& s = *state_;
   RunOutcome out;
-  if (!s.log.rows.empty()) out.health = s.log.rows.back().health;
   out.score = score_run(s.log, summary.truth);
-  out.text = summary_text(s.log, summary, out.score);
+  out.verdict = judge_run(s.log);
+  out.text = summary_text(s.log, summary, out.score) + "\n" + verdict_text(out.verdict, summary.findings);
   out.report = (s.place / "report.html").string();
 
   const auto write = [&](const char* name, const std::string& content) {
@@ -186,7 +186,8 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
     if (Status done = s.states_imu->commit(); !done) return done.error();
   if (Status done = s.write_trajectories(summary.T_body_cam); !done) return done.error();
   if (Status done = write("config.yaml", config.to_yaml()); !done) return done.error();
-  if (Status done = write("summary.json", summary_json(s.log, summary, config, out.score)); !done)
+  if (Status done = write("summary.json", summary_json(s.log, summary, config, out.score, out.verdict));
+      !done)
     return done.error();
   const std::string page = run_page({s.log, summary, config, out.score, s.overlays});
   if (Status done = write("report.html", page); !done) return done.error();

@@ -13,6 +13,7 @@
 #include "evpose/core/pose.h"
 #include "evpose/eval/score.h"
 #include "evpose/io/files/png_file.h"
+#include "evpose/report/run_verdict.h"
 #include "evpose/tracker/update.h"
 
 namespace evpose {
@@ -21,8 +22,10 @@ struct FusionState;
 
 /// What a run folder is told at the end, beside the updates.
 struct RunSummary {
-  std::string title;     ///< of the report, e.g. the recording's name
-  std::string subtitle;  ///< e.g. the map's name and how the run was started
+  std::string title;            ///< of the report, e.g. the recording's name
+  std::string subtitle;         ///< e.g. the map's name and how the run was started
+  std::string start;            ///< where the start pose came from: "started from ground truth"
+  std::vector<Error> findings;  ///< what looked wrong with the input before the run
   Pose T_body_cam;
   std::vector<TimedPose> truth;             ///< T_map_body; empty where not known
   std::vector<Eigen::Vector3d> map_points;  ///< map frame, metres; drawn, thinned out
@@ -36,10 +39,10 @@ struct RunSummary {
 
 /// What came out, for the last lines on the terminal.
 struct RunOutcome {
-  Health health = Health::waiting;       ///< at the end
   std::optional<TrajectoryScore> score;  ///< if there is ground truth
-  std::string text;                      ///< five lines for people
-  std::string report;                    ///< path of report.html
+  RunVerdict verdict;
+  std::string text;    ///< five lines for people, and the verdict
+  std::string report;  ///< path of report.html
 };
 
 /// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, if wanted states_imu.csv,

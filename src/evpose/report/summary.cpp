@@ -81,6 +81,18 @@ Json health_json(const StateLog& log) {
   return out;
 }
 
+Json problems_json(const RunVerdict& verdict) {
+  Json out = Json::array();
+  for (const RunProblem& p : verdict.problems)
+    out.push_back({{"state", to_string(p.health)},
+                   {"reason", p.reason},
+                   {"total_s", rounded(p.total_s)},
+                   {"last_s", seconds(p.last)},
+                   {"cause", p.cause},
+                   {"remedy", p.remedy}});
+  return out;
+}
+
 Json config_json(const ConfigTable& config) {
   Json out = Json::object();
   for (const ConfigTable::Value& v : config.values()) {
@@ -141,9 +153,15 @@ std::string score_json(const TrajectoryScore& score) {
 }
 
 std::string summary_json(const StateLog& log, const RunSummary& summary, const ConfigTable& config,
-                         const std::optional<TrajectoryScore>& score) {
+                         const std::optional<TrajectoryScore>& score, const RunVerdict& verdict) {
   Json out;
   out["status"] = status_word(log.rows.empty() ? Health::waiting : log.rows.back().health);
+  out["tracking_share"] = rounded(verdict.tracking_share);
+  out["problems"] = problems_json(verdict);
+  out["findings"] = Json::array();
+  for (const Error& f : summary.findings)
+    out["findings"].push_back({{"where", f.where}, {"what", f.what}, {"fix", f.fix}});
+  if (!summary.start.empty()) out["start"] = summary.start;
   if (score) {
     out["coverage"] = rounded(score->coverage);
     out["accuracy"] = accuracy_json(*score);
@@ -179,6 +197,7 @@ std::string summary_text(const StateLog& log, const RunSummary& summary,
   std::string out = line("%s at the end; %zu updates over %.2f s of data, %zu change(s) of health",
                          status_word(at_end).c_str(), log.rows.size(), data_seconds(log),
                          log.health.empty() ? 0 : log.health.size() - 1);
+  if (!summary.start.empty()) out += "; " + summary.start;
   if (score && score->pairs > 0) {
     out += line("\nposition error: mean %.2f mm, p95 %.2f mm, largest %.2f mm", score->ate_mm.mean,
                 score->ate_mm.p95, score->ate_mm.max);

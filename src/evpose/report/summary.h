@@ -32,7 +32,7 @@ std::string score_json(const TrajectoryScore& score);
 
 /// The content of summary.json.
 std::string summary_json(const StateLog& log, const RunSummary& summary, const ConfigTable& config,
-                         const std::optional<TrajectoryScore>& score);
+                         const std::optional<TrajectoryScore>& score, const RunVerdict& verdict);
 
 /// The score as a table for people; the last line has no line break.
 std::string score_text(const TrajectoryScore& score);

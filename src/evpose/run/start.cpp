@@ -110,4 +110,10 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
   return start;
 }
 
+std::string start_words(const std::string& init, bool has_truth) {
+  if (init == "groundtruth" || (init == "auto" && has_truth)) return "started from ground truth";
+  if (init == "auto") return "started from the recording's initial_pose";
+  return init.find(',') == std::string::npos ? "started from " + init : "started from --init";
+}
+
 }  // namespace evpose

@@ -25,4 +25,7 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
                                   const std::vector<TimedPose>& truth, const StartSigma& sigma,
                                   FusionConfig* config);
 
+/// Where choose_start() takes the pose from, in words: "started from ground truth".
+std::string start_words(const std::string& init, bool has_truth);
+
 }  // namespace evpose

@@ -16,6 +16,7 @@
 #include "evpose/io/recording/recording.h"
 #include "evpose/report/overlay.h"
 #include "evpose/run/packet_queue.h"
+#include "evpose/run/plausibility.h"
 #include "evpose/run/presets.h"
 #include "evpose/run/progress.h"
 #include "evpose/run/start.h"
@@ -28,8 +29,8 @@ constexpr std::size_t kDrawnMapPoints = 20'000;    // handed to the report
 constexpr double kOverlayDecay_s = 0.02;
 constexpr TimeNs kOverlayLead = 100 * kNsPerMs;  // a surface is kept so long before its picture
 
-/// Looks at the first seconds of the IMU before anything is made of them.
-Status check_units(const Recording& recording, const std::vector<TimedPose>& truth) {
+/// The first seconds of the IMU.
+Expected<std::vector<ImuSample>> read_first_imu(const Recording& recording) {
   auto imu = open_imu(recording);
   if (!imu) return imu.error();
   std::vector<ImuSample> samples;
@@ -40,6 +41,11 @@ Status check_units(const Recording& recording, const std::vector<TimedPose>& tru
     if (!*more) break;
     samples.push_back(sample);
   }
+  return samples;
+}
+
+Status check_units(const std::vector<ImuSample>& samples, const Recording& recording,
+                   const std::vector<TimedPose>& truth) {
   if (auto ok = check_imu_units(samples, recording.imu_path); !ok) return ok;
   return check_gyro_against(truth, samples, recording.imu_path);
 }
@@ -147,6 +153,9 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
   job.setup = {*camera, recording.T_cam_body.inverse(),
                recording.has_imu ? MotionModel::imu : MotionModel::constant_velocity, recording.imu_noise,
                *map};
+  job.start_words = start_words(request.init, !job.truth.empty());
+  for (const auto& doubt : {doubt_map_size(**map), doubt_start_place(**map, start->T_map_body)})
+    if (doubt) job.findings.push_back(*doubt);
   return job;
 }
 
@@ -159,9 +168,18 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
     if (!read) return read.error();
     truth = std::move(*read);
   }
-  if (recording->has_imu)
-    if (auto ok = check_units(*recording, truth); !ok) return ok.error();
-  return make_job(request, config, *recording, std::move(truth));
+  std::vector<ImuSample> imu;
+  if (recording->has_imu) {
+    auto read = read_first_imu(*recording);
+    if (!read) return read.error();
+    imu = std::move(*read);
+    if (auto ok = check_units(imu, *recording, truth); !ok) return ok.error();
+  }
+  auto job = make_job(request, config, *recording, std::move(truth));
+  if (!job) return job;
+  if (const auto doubt = doubt_start_attitude(imu, job->start, recording->imu_path))
+    job->findings.push_back(*doubt);
+  return job;
 }
 
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker) {
@@ -173,6 +191,8 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
   summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",
                           map.occluders.triangles.empty() ? "" : ", with occluders",
                           "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
+  summary.start = job.start_words;
+  summary.findings = job.findings;
   summary.T_body_cam = job.setup.T_body_cam;
   summary.truth = job.truth;
   const std::size_t step = map.points.size() / kDrawnMapPoints + 1;
@@ -256,7 +276,8 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   if (most_points == 0)
     return Error{job->map->source,
                  text("none of the map's ", job->map->points.size(), " points ever comes into view"),
-                 "check the map's frame, the start pose and the extrinsics T_cam_imu"};
+                 (job->findings.empty() ? "" : job->findings.front().line() + "; ") +
+                     "check the map's frame, the start pose and the extrinsics T_cam_imu"};
   if (!request.learnt_map.empty())
     if (auto ok = write_learnt_map(request.learnt_map, *job->map, **tracker); !ok) return ok.error();
 

@@ -47,7 +47,9 @@ struct TrackJob {
   std::shared_ptr<const ContourMap> map;
   std::vector<TimedPose> truth;  ///< empty: not known
   StartState start;
+  std::string start_words;  ///< where it came from
   TrackerSetup setup;
+  std::vector<Error> findings;  ///< what looks wrong although it can be tracked
 };
 /// The job on a recording that is known, with the map of the request or the recording's own.
 Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,

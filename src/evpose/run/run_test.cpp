@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "evpose/run/plausibility.h"
+#include "evpose/run/start.h"
+
+namespace evpose {
+namespace {
+
+/// The corners of a box, far from the origin.
+ContourMap box(double side_m) {
+  ContourMap map;
+  map.anchor = {100, 200, 0};
+  for (const double x : {0.0, side_m})
+    for (const double y : {0.0, side_m}) {
+      ContourPoint p;
+      p.position = Eigen::Vector3d(x, y, 0.5 * x).cast<float>();
+      map.points.push_back(p);
+    }
+  return map;
+}
+
+TEST(Plausibility, AMapInAnotherUnitIsDoubtedAndOneInMetresIsNot) {
+  for (const double metres : {2.0, 8.0, 300.0}) EXPECT_FALSE(doubt_map_size(box(metres))) << metres;
+  const auto centimetres = doubt_map_size(box(812)), kilometres = doubt_map_size(box(0.02));
+  ASSERT_TRUE(centimetres && kilometres);
+  EXPECT_EQ(centimetres->what, "map is 812 m wide: centimetres or millimetres?");
+  EXPECT_NE(kilometres->what.find("kilometres"), std::string::npos);
+  EXPECT_FALSE(doubt_map_size({}));
+}
+
+TEST(Plausibility, AStartOutsideOfTheMapIsDoubtedByItsDistance) {
+  const ContourMap map = box(10);
+  EXPECT_FALSE(doubt_start_place(map, {Eigen::Quaterniond::Identity(), {105, 205, 1}}));
+  EXPECT_FALSE(doubt_start_place(map, {Eigen::Quaterniond::Identity(), {110.4, 205, 1}}));
+  const auto doubt = doubt_start_place(map, {Eigen::Quaterniond::Identity(), {113, 214, 1}});
+  ASSERT_TRUE(doubt);
+  EXPECT_EQ(doubt->what, "lies 5 m outside of the map's bounds");  // 3 and 4 m along the axes
+  ContourMap wall = map;
+  for (ContourPoint& point : wall.points) point.position.x() *= 0.1F;
+  EXPECT_FALSE(doubt_start_place(wall, {Eigen::Quaterniond::Identity(), {96, 205, 0.2}}));
+}
+
+/// An IMU that turns about its y axis while it falls onto nothing: specific force is up, as it sees it.
+std::vector<ImuSample> turning_imu(double rate_rad_s) {
+  std::vector<ImuSample> out;
+  for (int i = 0; i <= 200; ++i) {
+    const double t_s = 0.005 * i;
+    ImuSample s;
+    s.t = from_seconds(t_s);
+    s.gyro = {0, rate_rad_s, 0};
+    s.accel = so3::exp(Eigen::Vector3d(0, -rate_rad_s * t_s, 0)) * Eigen::Vector3d(0, 0, 9.81);
+    out.push_back(s);
+  }
+  return out;
+}
+
+TEST(Plausibility, AStartWhoseUpIsNotThatOfTheAccelerometerIsDoubtedByTheAngle) {
+  StartState start;
+  const auto samples = turning_imu(2);  // by 57 deg in the half second: what counts is the start's attitude
+  EXPECT_FALSE(doubt_start_attitude(samples, start, "imu.csv"));
+  start.T_map_body.q = so3::exp({0.3, 0, 0});
+  EXPECT_FALSE(doubt_start_attitude(samples, start, "imu.csv"));
+  start.T_map_body.q = so3::exp({0, M_PI / 2, 0});
+  const auto doubt = doubt_start_attitude(samples, start, "imu.csv");
+  ASSERT_TRUE(doubt);
+  EXPECT_EQ(doubt->where, "imu.csv");
+  EXPECT_NE(doubt->what.find(" 90 deg"), std::string::npos) << doubt->what;
+  start.t = from_seconds(5);  // after the samples: nothing can be said
+  EXPECT_FALSE(doubt_start_attitude(samples, start, "imu.csv"));
+  EXPECT_FALSE(doubt_start_attitude({}, start, "imu.csv"));
+}
+
+TEST(Start, WordsTellWhereThePoseComesFrom) {
+  EXPECT_EQ(start_words("auto", true), "started from ground truth");
+  EXPECT_EQ(start_words("groundtruth", true), "started from ground truth");
+  EXPECT_EQ(start_words("auto", false), "started from the recording's initial_pose");
+  EXPECT_EQ(start_words("1,2,3,0,0,0,1", true), "started from --init");
+  EXPECT_EQ(start_words("a.tum", true), "started from a.tum");
+}
+
+}  // namespace
+}  // namespace evpose

@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "evpose/core/log.h"
 #include "evpose/io/formats/open_events.h"
+#include "evpose/io/maps/cloud_files.h"
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/motion/trajectory.h"
 #include "info_parts.h"
@@ -85,19 +86,39 @@ int info(const std::string& path, bool json) {
 
 }  // namespace
 
+namespace {
+
+std::string bounds_text(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  return "x " + fixed(low.x(), 2) + " .. " + fixed(high.x(), 2) + "  y " + fixed(low.y(), 2) + " .. " +
+         fixed(high.y(), 2) + "  z " + fixed(low.z(), 2) + " .. " + fixed(high.z(), 2) + " m";
+}
+
+/// What is no map of contours may be a cloud to build one from.
+Status describe_cloud(Sheet& sheet, const std::string& path, const Error& no_map) {
+  const auto cloud = read_cloud(path);
+  if (!cloud) return no_map;
+  Eigen::Vector3f low = cloud->points.front(), high = low;
+  for (const auto& p : cloud->points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  const Eigen::Vector3d l = cloud->anchor + low.cast<double>(), h = cloud->anchor + high.cast<double>();
+  sheet.section("cloud: " + path, "cloud");
+  sheet.row("points", text(cloud->points.size()), "points", cloud->points.size());
+  sheet.row("bounds", bounds_text(l, h), "bounds_m", {l.x(), l.y(), l.z(), h.x(), h.y(), h.z()});
+  sheet.find(no_map);
+  return {};
+}
+
+}  // namespace
+
 Status describe_map(Sheet& sheet, const std::string& path) {
   const auto map = read_contour_map(path);
-  if (!map) return map.error();
+  if (!map) return describe_cloud(sheet, path, map.error());
   const MapFigures f = figures_of(*map);
   sheet.section("map: " + path, "map");
   sheet.row("points", text(map->points.size()), "points", map->points.size());
   sheet.row("contours", text(f.contours), "contours", f.contours);
   sheet.row("length", fixed(f.length_m, 1) + " m", "length_m", f.length_m);
-  sheet.row("bounds",
-            "x " + fixed(f.low.x(), 2) + " .. " + fixed(f.high.x(), 2) + "  y " + fixed(f.low.y(), 2) +
-                " .. " + fixed(f.high.y(), 2) + "  z " + fixed(f.low.z(), 2) + " .. " + fixed(f.high.z(), 2) +
-                " m",
-            "bounds_m", {f.low.x(), f.low.y(), f.low.z(), f.high.x(), f.high.y(), f.high.z()});
+  sheet.row("bounds", bounds_text(f.low, f.high), "bounds_m",
+            {f.low.x(), f.low.y(), f.low.z(), f.high.x(), f.high.y(), f.high.z()});
   sheet.row("occluders", text(map->occluders.triangles.size(), " triangles"), "occluders",
             map->occluders.triangles.size());
   sheet.row("frame", map->frame, "frame", map->frame);

@@ -64,7 +64,7 @@ Expected<InputKind> kind_of_input(const std::string& path) {
   if (ends_with_any(path, {".yaml", ".yml", ".json"}) ||
       std::filesystem::path(path).filename() == "calib.txt")
     return InputKind::calibration;
-  if (ends_with_any(path, {".ply", ".pcd"})) return InputKind::map;
+  if (ends_with_any(path, {".ply", ".pcd", ".las"})) return InputKind::map;
   const auto format = find_event_format(path, "");
   if (!format) return format.error();
   const std::string name = (*format)->name;

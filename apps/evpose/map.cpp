@@ -8,7 +8,6 @@
 #include <set>
 
 #include "commands.h"
-#include "evpose/camera/camera.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/map_h5.h"
@@ -66,15 +65,10 @@ int print_map(const ContourMap& map) {
 
 int write_report(const ContourMap& map, const std::string& path, double pitch_deg,
                  std::vector<double> heights_m) {
-  const auto camera = make_camera({460, 460, 319.5, 239.5, "none", {}, {640, 480}});
-  if (!camera) return bad_input(camera.error());
-  if (heights_m.empty()) {
-    const MapFigures f = figures_of(map);
-    for (const double share : {0.25, 0.5}) heights_m.push_back(f.low.z() + share * (f.high.z() - f.low.z()));
-  }
+  if (heights_m.empty()) heights_m = survey_heights(map);
   constexpr int kCells = 20;
   const double pitch = pitch_deg / 57.29577951;
-  const AccuracySurvey survey = survey_accuracy(map, **camera, pitch, heights_m, kCells);
+  const AccuracySurvey survey = survey_accuracy(map, survey_camera(), pitch, heights_m, kCells);
   if (const auto ok = write_text_file(path, map_page(map, survey, pitch)); !ok) return bad_input(ok.error());
   return 0;
 }

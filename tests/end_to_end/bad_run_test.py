@@ -73,6 +73,20 @@ class BadRunTest(unittest.TestCase):
         self.recording.contours[:, 1:3] = self.recording.contours[:, 1:3] * 1.3 + 0.17
         self.bad_run()
 
+    def test_a_cloud_is_no_map(self):
+        a, b = np.meshgrid(np.arange(-1.5, 1.5, 0.02), np.arange(-1.5, 1.5, 0.02))
+        wall = np.stack([np.full(a.size, 3.0), a.ravel(), b.ravel() + 1], axis=1)
+        cloud = self.root / "wall.pcd"
+        header = (f"VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {len(wall)}\nHEIGHT 1\n"
+                  f"POINTS {len(wall)}\nDATA binary\n")
+        cloud.write_bytes(header.encode() + wall.astype("<f4").tobytes())
+        result = self.track("--map", cloud)
+        self.assertEqual(result.returncode, 2, result.stdout)
+        self.assertRegex(result.stderr, r"^evpose: .*wall\.pcd: is a cloud.*; run `evpose map build .*`.*\n$")
+        told = subprocess.run([EVPOSE, "info", cloud], capture_output=True, text=True, timeout=60)
+        self.assertEqual(told.returncode, 0, told.stderr)
+        self.assertIn("evpose map build", told.stdout)
+
     def test_events_without_contours(self):
         rows = len(self.recording.contours)
         self.recording.contours = self.recording.contours[np.arange(rows) % 600 < 3]  # a few dots of each line

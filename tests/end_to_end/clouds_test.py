@@ -77,10 +77,11 @@ class CloudsTest(unittest.TestCase):
         self.assertEqual({path.name for path in self.root.iterdir()}, {"map.h5", name}, "left behind")
 
     def made(self, content, *warnings, name="cloud.ply"):
-        """Builds; stderr must be one line for each expression."""
+        """Builds; stderr must be one line for each expression, and that a corner alone tells no pose."""
         result = self.build(content, name)
         self.assertEqual(result.returncode, 0, result.stderr)
-        lines = result.stderr.splitlines()
+        *lines, verdict = result.stderr.splitlines()
+        self.assertRegex(verdict, r"a pose is told to 15 mm in 0 % of the volume only")
         self.assertEqual(len(lines), len(warnings), result.stderr)
         for line, expression in zip(lines, warnings):
             self.assertRegex(line, re.compile(expression, re.IGNORECASE))

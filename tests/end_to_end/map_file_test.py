@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The map file as another program reads it, checksums and all. map_file_test.py EVPOSE"""
 import pathlib
+import re
 import struct
 import subprocess
 import sys
@@ -134,7 +135,7 @@ class MapBuildTest(unittest.TestCase):
         cls.root = pathlib.Path(scratch.name)
         cls.points = box_cloud()
         write_ply(cls.root / "cloud.ply", cls.points)
-        MapFileTest.run_evpose("map", "build", cls.root / "cloud.ply", "-o", cls.root / "map.h5")
+        cls.said = MapFileTest.run_evpose("map", "build", cls.root / "cloud.ply", "-o", cls.root / "map.h5").stdout
 
     def refused(self, path, *says):
         result = MapFileTest.run_evpose("-q", "map", "build", path, "-o", self.root / "none.h5", status=2)
@@ -153,6 +154,13 @@ class MapBuildTest(unittest.TestCase):
         # Three creases meet in the corner.
         self.assertAlmostEqual(length[kind == 1].sum(), 2 + 2 + 1.5, delta=0.2)
         self.assertLess(np.sort(np.abs(xyz), axis=1)[:, 0].max(), 0.02)
+
+    def test_the_build_tells_where_a_pose_can_be_told_and_what_it_wrote(self):
+        verdict = re.search(r"verdict +a pose is told to 5 mm in (\d+) % .* 15 mm in (\d+) %, to 50 mm in (\d+) %", self.said)
+        self.assertTrue(verdict, self.said)
+        shares = [int(share) for share in verdict.groups()]
+        self.assertEqual(shares, sorted(shares))
+        self.assertRegex(self.said, rf"output +{re.escape(str(self.root / 'map.h5'))};")
 
     def test_las_gives_the_map_of_the_same_points(self):
         points = np.round(self.points.astype(float), 4)

@@ -17,7 +17,8 @@ namespace {
 
 constexpr double kCorrelated_px = 0.35;  // as in registration: correlated error of neighbouring events
 constexpr double kCell_px = 32;
-constexpr double kUnknown = 1e3;  // m or rad: prior sigma of an unknown pose
+constexpr double kUnknown = 1e3;        // m or rad: prior sigma of an unknown pose
+constexpr double kNoPosition_mm = 1e3;  // a sigma beyond tells no position
 
 }  // namespace
 
@@ -67,6 +68,44 @@ ViewAccuracy expected_accuracy(const ContourMap& map, std::span<const std::uint3
   out.worst_axis = place.eigenvectors().col(2);
   out.angle_deg = 180 / std::numbers::pi * std::sqrt(turn.eigenvalues()[2]);
   return out;
+}
+
+namespace {
+
+AccuracyShares shares_of(std::span<const ViewAccuracy> cells, double weight) {
+  AccuracyShares out;
+  for (const ViewAccuracy& cell : cells) {
+    out.to_5mm += cell.worst_mm <= 5 ? weight : 0;
+    out.to_15mm += cell.worst_mm <= 15 ? weight : 0;
+    out.to_50mm += cell.worst_mm <= 50 ? weight : 0;
+    out.none += cell.worst_mm <= kNoPosition_mm ? 0 : weight;
+  }
+  return out;
+}
+
+}  // namespace
+
+AccuracyShares shares_of(const AccuracySlice& slice) {
+  return shares_of(slice.cells, 1 / static_cast<double>(std::max<std::size_t>(1, slice.cells.size())));
+}
+
+AccuracyShares shares_of(const AccuracySurvey& survey) {
+  std::vector<ViewAccuracy> all;
+  for (const AccuracySlice& slice : survey.slices)
+    all.insert(all.end(), slice.cells.begin(), slice.cells.end());
+  return shares_of(all, 1 / static_cast<double>(std::max<std::size_t>(1, all.size())));
+}
+
+const Camera& survey_camera() {
+  static const auto camera = make_camera({460, 460, 319.5, 239.5, "none", {}, {640, 480}});
+  return **camera;
+}
+
+std::vector<double> survey_heights(const ContourMap& map) {
+  double low = map.position(0).z(), high = low;
+  for (std::size_t i = 1; i < map.points.size(); ++i)
+    low = std::min(low, map.position(i).z()), high = std::max(high, map.position(i).z());
+  return {low + 0.25 * (high - low), low + 0.5 * (high - low)};
 }
 
 AccuracySurvey survey_accuracy(const ContourMap& map, const Camera& camera, double pitch_down_rad,

@@ -42,6 +42,19 @@ struct AccuracySurvey {
   std::size_t index_bytes = 0;  ///< of the spatial index
 };
 
+/// Shares of a survey's cells, 0..1, in which a pose is told to so many mm along its worst axis.
+struct AccuracyShares {
+  double to_5mm = 0, to_15mm = 0, to_50mm = 0;
+  double none = 0;  ///< tell no position: worse than a metre
+};
+AccuracyShares shares_of(const AccuracySlice& slice);
+AccuracyShares shares_of(const AccuracySurvey& survey);
+
+/// The camera that surveys are made with: 640 x 480 pixels of 460 px focal length.
+const Camera& survey_camera();
+/// Heights at which a map is surveyed unless told: a quarter and half of its own.
+std::vector<double> survey_heights(const ContourMap& map);
+
 /// Slices over the map's bounds at the heights given, `cells` along the longer side.
 AccuracySurvey survey_accuracy(const ContourMap& map, const Camera& camera, double pitch_down_rad,
                                std::span<const double> heights_m, int cells);

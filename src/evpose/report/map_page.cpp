@@ -199,17 +199,11 @@ std::string planes_table(const ContourMap& map) {
 }
 
 std::string slice_words(const AccuracySlice& slice) {
-  std::vector<double> values;
-  for (const auto& cell : slice.cells) values.push_back(cell.worst_mm);
-  std::sort(values.begin(), values.end());
-  const auto share = [&](double mm) {
-    return 100.0 * static_cast<double>(std::upper_bound(values.begin(), values.end(), mm) - values.begin()) /
-           static_cast<double>(values.size());
-  };
+  const AccuracyShares shares = shares_of(slice);
   return format(
-      "<h3>Cameras at z = %.2f m</h3><p>%.0f %% of the cells are good to 5 mm, %.0f %% to 15 mm; %.0f %% "
-      "tell no position.</p>",
-      slice.height_m, share(5), share(15), 100 - share(1000));
+      "<h3>Cameras at z = %.2f m</h3><p>%.0f %% of the cells are good to 5 mm, %.0f %% to 15 mm, %.0f %% to "
+      "50 mm; %.0f %% tell no position.</p>",
+      slice.height_m, 100 * shares.to_5mm, 100 * shares.to_15mm, 100 * shares.to_50mm, 100 * shares.none);
 }
 
 }  // namespace

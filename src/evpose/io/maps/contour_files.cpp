@@ -11,11 +11,17 @@
 #include "evpose/io/maps/map_h5.h"
 #include "evpose/io/maps/pcd.h"
 #include "evpose/io/maps/ply.h"
+#include "evpose/io/maps/surface_shape.h"
 
 namespace evpose {
 namespace {
 
 constexpr double kFarthest = 1e7;  // m from the origin of the map
+
+Error cloud_error(const std::string& path) {
+  return Error{path, "is a cloud of surface points, not a map of contours",
+               "run `evpose map build " + path + " -o map.h5` and give map.h5"};
+}
 
 /// Three columns that together are a vector; all pointers set, or none.
 struct VectorColumns {
@@ -164,6 +170,17 @@ Eigen::Vector3d rounded_centre(const VectorColumns& position, std::size_t rows) 
   return (0.5 * (low + high)).array().round();
 }
 
+/// Files that say nothing of contours may be scans, which would be tracked against as if they were edges.
+Status check_not_a_cloud(const PointTable& table, const ContourMap& map) {
+  for (const char* name : {"tx", "xg", "kind", "contour", "plane", "plane_a", "length", "sigma", "contrast"})
+    if (table.find(name) != nullptr) return {};
+  std::vector<Eigen::Vector3f> positions;
+  positions.reserve(map.points.size());
+  for (const ContourPoint& p : map.points) positions.push_back(p.position);
+  if (!lies_on_surfaces(positions)) return {};
+  return cloud_error(map.source);
+}
+
 Expected<ContourMap> from_table(const PointTable& table, const std::string& path,
                                 const ContourReadOptions& options) {
   const std::size_t rows = table.rows();
@@ -196,6 +213,7 @@ Expected<ContourMap> from_table(const PointTable& table, const std::string& path
     if (tangent) p.tangent = tangent.at(i).cwiseMin(1e9).cwiseMax(-1e9).cast<float>();
     if (auto status = fill_entries(table, i, path, p); !status) return status.error();
   }
+  if (auto status = check_not_a_cloud(table, map); !status) return status.error();
   if (auto status = complete_contours(map); !status) return status.error();
   return map;
 }
@@ -211,6 +229,7 @@ Expected<ContourMap> read_contour_map(const std::string& path, const ContourRead
     if (auto status = complete_contours(*map); !status) return status.error();
     return map;
   }
+  if (*kind == PointFileKind::las) return cloud_error(path);
   if (*kind != PointFileKind::ply && *kind != PointFileKind::pcd)
     return Error{path, "is neither PLY, PCD nor HDF5", "convert the map to one of them"};
   const auto table = *kind == PointFileKind::ply ? read_ply_vertices(path) : read_pcd(path);

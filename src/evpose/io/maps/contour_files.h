@@ -20,7 +20,8 @@ struct ContourReadOptions {
 /// normals unit and across the tangent or zero where unknown, lengths (from the spacing where absent). Points
 /// whose tangent cannot be told are left out with a warning. By content: our contours.ply, any PLY or PCD
 /// cloud of edge points with or without normals, or map.h5. Errors: no points, not finite (which point), most
-/// points without a tangent, gradient columns in another frame.
+/// points without a tangent, gradient columns in another frame, points on surfaces in a file that says
+/// nothing of contours, as scans have them.
 Expected<ContourMap> read_contour_map(const std::string& path, const ContourReadOptions& options = {});
 
 }  // namespace evpose

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "evpose/io/motion/imu_axes.h"
 #include "evpose/io/motion/imu_text.h"
 #include "evpose/io/motion/imu_units.h"
 #include "evpose/io/recording/imu_survey.h"
@@ -96,7 +97,11 @@ Span describe_imu(Sheet& sheet, const std::string& where, const std::vector<ImuS
   ImuUnitCheck units;
   for (const ImuSample& sample : samples) units.add(sample);
   if (auto status = units.check_accel(where); !status) sheet.find(status.error());
-  if (auto status = units.check_gyro(where); !status) sheet.find(status.error());
+  if (auto status = units.check_gyro(where); !status)
+    sheet.find(status.error());
+  else if (const auto doubt = doubt_gyro_by_gravity(samples, where))
+    sheet.find(*doubt);
+  if (const auto doubt = doubt_imu_scales(samples, where)) sheet.find(*doubt);
   if (s.at_rest)
     describe_rest(sheet, where, *s.at_rest);
   else

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <filesystem>
 
+#include "evpose/io/motion/imu_axes.h"
 #include "evpose/io/motion/trajectory.h"
 #include "evpose/io/recording/dataset_layouts.h"
 #include "info_parts.h"
@@ -89,11 +90,11 @@ void describe_parts(Sheet& sheet, const FoundRecording& found) {
 
 void describe_opened(Sheet& sheet, const FoundRecording& found, const Recording& r) {
   std::optional<Span> imu;
+  std::vector<ImuSample> samples;
   const auto events = describe_events(sheet, r.events_path, r.events_format, r.event_options);
   if (!events) sheet.find(events.error());
   if (r.has_imu) {
     auto reader = open_imu(r);
-    std::vector<ImuSample> samples;
     ImuSample sample;
     while (reader) {
       const auto more = reader->next(sample);
@@ -110,6 +111,8 @@ void describe_opened(Sheet& sheet, const FoundRecording& found, const Recording&
       describe_trajectory(sheet, r.groundtruth_path, *poses, "ground truth");
     else
       sheet.find(poses.error());
+    if (poses)
+      for (const Error& doubt : doubt_axes_against(*poses, samples, r.imu_path)) sheet.find(doubt);
   }
   if (found.camera) {
     describe_camera(sheet, *found.camera, "camera " + found.camera->name);

@@ -73,6 +73,15 @@ class BadRunTest(unittest.TestCase):
         self.recording.contours[:, 1:3] = self.recording.contours[:, 1:3] * 1.3 + 0.17
         self.bad_run()
 
+    def test_axes_of_the_imu_that_are_mixed_up(self):
+        self.recording = Recording(duration_s=2)
+        self.recording.imu[:, 3:] = self.recording.imu[:, [5, 4, 3]] * [1, 1, -1]
+        said = self.track()
+        self.assertRegex(said.stderr, r"warning: .*imu\.csv: the accelerometer's axes do not fit the ground truth's .*"
+                                      r"y were y, z were x; rename the columns")
+        told = subprocess.run([EVPOSE, "info", self.root / "recording"], capture_output=True, text=True, timeout=60)
+        self.assertIn("y were y, z were x", told.stdout)
+
     def test_a_cloud_is_no_map(self):
         a, b = np.meshgrid(np.arange(-1.5, 1.5, 0.02), np.arange(-1.5, 1.5, 0.02))
         wall = np.stack([np.full(a.size, 3.0), a.ravel(), b.ravel() + 1], axis=1)

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "evpose/imu/strapdown.h"
+#include "evpose/io/motion/imu_axes.h"
 
 namespace evpose {
 namespace {
@@ -76,6 +77,18 @@ std::optional<Error> doubt_start_attitude(const std::vector<ImuSample>& samples,
                text("at the start the accelerometer's up lies ", std::round(off_deg), " deg off the map's z"),
                "check the quaternion of the start (x,y,z,w, of the IMU in the map), the axes of the IMU, and "
                "that the map's z is up"};
+}
+
+std::vector<Error> doubt_imu(const std::vector<ImuSample>& samples, const std::vector<TimedPose>& truth,
+                             const StartState& start, const std::string& where) {
+  std::vector<Error> out;
+  if (auto doubt = doubt_imu_scales(samples, where)) out.push_back(*std::move(doubt));
+  // The ground truth knows better than gravity alone.
+  for (Error& doubt : doubt_axes_against(truth, samples, where)) out.push_back(std::move(doubt));
+  if (!out.empty()) return out;
+  if (auto doubt = doubt_gyro_by_gravity(samples, where)) out.push_back(*std::move(doubt));
+  if (auto doubt = doubt_start_attitude(samples, start, where)) out.push_back(*std::move(doubt));
+  return out;
 }
 
 }  // namespace evpose

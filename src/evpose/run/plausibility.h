@@ -26,4 +26,9 @@ std::optional<Error> doubt_start_place(const ContourMap& map, const Pose& T_map_
 std::optional<Error> doubt_start_attitude(const std::vector<ImuSample>& samples, const StartState& start,
                                           const std::string& where);
 
+/// Everything that can be said of the IMU: its start's attitude, scales, and axes, against the ground truth
+/// where there is one.
+std::vector<Error> doubt_imu(const std::vector<ImuSample>& samples, const std::vector<TimedPose>& truth,
+                             const StartState& start, const std::string& where);
+
 }  // namespace evpose

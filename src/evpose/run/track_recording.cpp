@@ -8,6 +8,7 @@
 #include <chrono>
 #include <memory>
 
+#include "evpose/core/log.h"
 #include "evpose/io/files/config_yaml.h"
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/map_h5.h"
@@ -177,8 +178,8 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   }
   auto job = make_job(request, config, *recording, std::move(truth));
   if (!job) return job;
-  if (const auto doubt = doubt_start_attitude(imu, job->start, recording->imu_path))
-    job->findings.push_back(*doubt);
+  for (const Error& doubt : doubt_imu(imu, job->truth, job->start, recording->imu_path))
+    job->findings.push_back(doubt);
   return job;
 }
 
@@ -253,6 +254,7 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   if (!run) return run.error();
   auto tracker = Tracker::create(job->setup, config.tracker, job->start, wall_s);
   if (!tracker) return tracker.error();
+  for (const Error& finding : job->findings) log_warning(finding.line());
   int most_points = 0;
   std::int64_t updates = 0;
   OverlayWriter overlays(**tracker, *run, job->start.t, job->recording.last_ns, config.overlays);

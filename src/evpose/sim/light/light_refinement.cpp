@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace evpose::sim {
 namespace {
@@ -20,15 +21,19 @@ LightMap interpolated(const LightMap& map, int parts) {
   const std::size_t texels = static_cast<std::size_t>(map.columns) * map.rows,
                     fine_texels = static_cast<std::size_t>(fine.columns) * fine.rows;
   fine.values.resize(map.values.size() / texels * fine_texels);
-  for (std::size_t i = 0; i < fine.values.size(); ++i) {
-    const std::size_t x = i % fine_texels % fine.columns, y = i % fine_texels / fine.columns;
-    const std::size_t column = std::min<std::size_t>(x / parts, map.columns - 2),
-                      row = std::min<std::size_t>(y / parts, map.rows - 2);
-    const float a = static_cast<float>(x - column * parts) / static_cast<float>(parts),
-                b = static_cast<float>(y - row * parts) / static_cast<float>(parts);
-    const float* at = &map.values[i / fine_texels * texels + row * map.columns + column];
-    fine.values[i] =
-        (1 - b) * ((1 - a) * at[0] + a * at[1]) + b * ((1 - a) * at[map.columns] + a * at[map.columns + 1]);
+  auto out = fine.values.begin();
+  for (std::size_t first = 0; first < map.values.size(); first += texels) {
+    for (int y = 0; y < fine.rows; ++y) {
+      const int row = std::min(y / parts, map.rows - 2);
+      const float b = static_cast<float>(y - row * parts) / static_cast<float>(parts);
+      for (int x = 0; x < fine.columns; ++x) {
+        const int column = std::min(x / parts, map.columns - 2);
+        const float a = static_cast<float>(x - column * parts) / static_cast<float>(parts);
+        const float* at = &map.values[first + static_cast<std::size_t>(row) * map.columns + column];
+        *out++ = (1 - b) * ((1 - a) * at[0] + a * at[1]) +
+                 b * ((1 - a) * at[map.columns] + a * at[map.columns + 1]);
+      }
+    }
   }
   return fine;
 }
@@ -77,21 +82,42 @@ bool LightRefinement::is_uneven(int column, int row) const {
   return false;
 }
 
+// Cells whose light may have changed: all at first, then those at the cells that were computed anew.
+std::vector<std::size_t> LightRefinement::changed_cells() const {
+  std::vector<std::size_t> cells;
+  if (!started_) {
+    cells.resize(done_.size());
+    std::iota(cells.begin(), cells.end(), std::size_t{0});
+    return cells;
+  }
+  for (const std::size_t k : latest_) {
+    const int column = static_cast<int>(k % columns_), row = static_cast<int>(k / columns_);
+    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
+      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, columns_ - 1); ++x)
+        if (!done_[cell(x, y)]) cells.push_back(cell(x, y));
+  }
+  std::sort(cells.begin(), cells.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  return cells;
+}
+
 std::vector<std::uint32_t> LightRefinement::next_texels() {
   std::vector<std::uint32_t> texels;
   if (parts_ < 2) return texels;
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      const std::size_t k = cell(column, row);
-      if (done_[k] || !(wanted_[k] || is_uneven(column, row))) continue;
-      done_[k] = true;
-      for (int y = row * parts_; y <= (row + 1) * parts_; ++y) {
-        for (int x = column * parts_; x <= (column + 1) * parts_; ++x) {
-          const std::size_t texel = static_cast<std::size_t>(y) * map_.columns + x;
-          if (fine_[texel]) continue;
-          fine_[texel] = true;
-          texels.push_back(static_cast<std::uint32_t>(texel));
-        }
+  const std::vector<std::size_t> changed = changed_cells();
+  started_ = true;
+  latest_.clear();
+  for (const std::size_t k : changed) {
+    const int column = static_cast<int>(k % columns_), row = static_cast<int>(k / columns_);
+    if (!wanted_[k] && !is_uneven(column, row)) continue;
+    done_[k] = true;
+    latest_.push_back(k);
+    for (int y = row * parts_; y <= (row + 1) * parts_; ++y) {
+      for (int x = column * parts_; x <= (column + 1) * parts_; ++x) {
+        const std::size_t texel = static_cast<std::size_t>(y) * map_.columns + x;
+        if (fine_[texel]) continue;
+        fine_[texel] = true;
+        texels.push_back(static_cast<std::uint32_t>(texel));
       }
     }
   }

@@ -28,12 +28,15 @@ class LightRefinement {
  private:
   std::size_t cell(int column, int row) const { return static_cast<std::size_t>(row) * columns_ + column; }
   bool is_uneven(int column, int row) const;
+  std::vector<std::size_t> changed_cells() const;
 
   LightMap& map_;
   int parts_ = 1;                           // texels along a side of a cell
   int columns_ = 0, rows_ = 0;              // cells
   std::vector<bool> wanted_, done_, fine_;  // cells, cells, texels
   std::vector<float> peak_;                 // of each channel, lux
+  bool started_ = false;                    // texels have been asked for
+  std::vector<std::size_t> latest_;         // cells that were last computed anew
 };
 
 }  // namespace evpose::sim

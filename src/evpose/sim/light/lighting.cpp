@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <span>
 
 #include "evpose/core/parallel.h"
@@ -137,6 +138,7 @@ class LightBaker {
 struct FlatTriangle {
   std::array<Eigen::Vector2d, 3> corner;
   std::array<Eigen::Vector3d, 3> normal;
+  Eigen::AlignedBox2d box;  ///< of the corners
 };
 
 double cross2(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -159,21 +161,32 @@ struct PatchPoint {
   Eigen::Vector3d normal;
 };
 PatchPoint nearest_point(const std::vector<FlatTriangle>& triangles, const Eigen::Vector2d& p) {
+  constexpr double kInside_m2 = 1e-12;
+  constexpr double kRounding = 1 + 1e-9;
   PatchPoint best{};
   double least = std::numeric_limits<double>::infinity();
-  for (const FlatTriangle& t : triangles) {
+  const auto try_triangle = [&](const FlatTriangle& t) {
     const Eigen::Vector3d w = weights(t, p);
     const Eigen::Vector2d at = w[0] * t.corner[0] + w[1] * t.corner[1] + w[2] * t.corner[2];
     const double distance = (at - p).squaredNorm();
-    if (distance >= least) continue;
+    if (distance >= least) return;
     least = distance;
     const Eigen::Vector2d middle = (t.corner[0] + t.corner[1] + t.corner[2]) / 3;
     const Eigen::Vector2d inward = middle - at;
     const double length = inward.norm();
     best.at = length > 0 ? Eigen::Vector2d(at + std::min(kInset_m, 0.5 * length) / length * inward) : at;
     best.normal = (w[0] * t.normal[0] + w[1] * t.normal[1] + w[2] * t.normal[2]).normalized();
-    if (distance < 1e-12) break;
+  };
+  // The triangle around the point, if there is one: none before it in the list is as near.
+  for (const FlatTriangle& t : triangles) {
+    if (t.box.squaredExteriorDistance(p) > kInside_m2) continue;
+    least = std::numeric_limits<double>::infinity();
+    try_triangle(t);
+    if (least < kInside_m2) return best;
   }
+  least = std::numeric_limits<double>::infinity();
+  for (const FlatTriangle& t : triangles)
+    if (t.box.squaredExteriorDistance(p) <= kRounding * least) try_triangle(t);
   return best;
 }
 
@@ -196,6 +209,7 @@ std::vector<FlatTriangle> flatten(const Mesh& mesh, const std::vector<std::size_
       const Eigen::Vector3d p = mesh.vertices[mesh.triangles[i][k]].cast<double>();
       t.corner[k] = {map.right.dot(p), map.up.dot(p)};
       t.normal[k] = mesh.normals[i][k].cast<double>();
+      t.box.extend(t.corner[k]);
     }
     flat.push_back(t);
   }
@@ -233,30 +247,56 @@ void bake_texel(const LightBaker& baker, const std::vector<FlatTriangle>& flat, 
   for (std::size_t c = 0; c < light.size(); ++c) map.values[c * texels + i] = light[c];
 }
 
+// The corners of all things, each place once, sorted along x.
+std::vector<Eigen::Vector3d> corners_along_x(const Mesh& mesh) {
+  std::vector<Eigen::Vector3f> places = mesh.vertices;
+  std::sort(places.begin(), places.end(), [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  });
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  std::vector<Eigen::Vector3d> out;
+  out.reserve(places.size());
+  for (const Eigen::Vector3f& p : places) out.emplace_back(p.cast<double>());
+  return out;
+}
+
 // The cells that corners of things touch.
-void want_feet(const Mesh& mesh, const Patch& patch, LightRefinement& finer) {
-  for (const Eigen::Vector3f& vertex : mesh.vertices) {
-    const Eigen::Vector3d p = vertex.cast<double>();
-    if (std::abs(patch.normal.dot(p) + patch.offset) < kFine_m)
-      finer.want_cell_at({patch.light.right.dot(p), patch.light.up.dot(p)});
-  }
+void want_feet(const std::vector<Eigen::Vector3d>& corners, const Patch& patch, LightRefinement& finer) {
+  const LightMap& map = patch.light;
+  // The range of x of the map's rectangle and of what is near it.
+  double low = -patch.offset * patch.normal.x() - kFine_m, high = low + 2 * kFine_m;
+  const auto add_side = [&](double axis_x, double start, int texels) {
+    const double a = axis_x * start, b = axis_x * (start + (texels - 1) / map.per_metre);
+    low += std::min(a, b);
+    high += std::max(a, b);
+  };
+  add_side(map.right.x(), map.right0, map.columns);
+  add_side(map.up.x(), map.up0, map.rows);
+  const auto first = std::lower_bound(corners.begin(), corners.end(), low,
+                                      [](const Eigen::Vector3d& p, double x) { return p.x() < x; });
+  for (auto at = first; at != corners.end() && at->x() <= high; ++at)
+    if (std::abs(patch.normal.dot(*at) + patch.offset) < kFine_m)
+      finer.want_cell_at({map.right.dot(*at), map.up.dot(*at)});
 }
 
 void refine(const LightBaker& baker, const std::vector<std::vector<FlatTriangle>>& flat,
             PartSurfaces& surfaces, ThreadPool& pool) {
-  std::vector<LightRefinement> finer;
-  for (Patch& patch : surfaces.patches) finer.emplace_back(patch.light, kFine_m);
+  const std::vector<Eigen::Vector3d> corners = corners_along_x(baker.mesh());
+  std::vector<std::optional<LightRefinement>> finer(surfaces.patches.size());
   pool.for_chunks(finer.size(), 1, [&](std::size_t, std::size_t k, std::size_t) {
-    want_feet(baker.mesh(), surfaces.patches[k], finer[k]);
+    want_feet(corners, surfaces.patches[k], finer[k].emplace(surfaces.patches[k].light, kFine_m));
   });
   struct Job {
     std::size_t patch, texel;
   };
   std::vector<Job> jobs;
+  std::vector<std::vector<std::uint32_t>> texels(finer.size());
   do {
+    pool.for_chunks(finer.size(), 1,
+                    [&](std::size_t, std::size_t k, std::size_t) { texels[k] = finer[k]->next_texels(); });
     jobs.clear();
     for (std::size_t k = 0; k < finer.size(); ++k)
-      for (const std::uint32_t texel : finer[k].next_texels()) jobs.push_back({k, texel});
+      for (const std::uint32_t texel : texels[k]) jobs.push_back({k, texel});
     pool.for_chunks(jobs.size(), 256, [&](std::size_t, std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         bake_texel(baker, flat[jobs[i].patch], surfaces.patches[jobs[i].patch], jobs[i].texel);

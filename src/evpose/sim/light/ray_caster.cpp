@@ -151,14 +151,20 @@ void RayCaster::trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen
 }
 
 unsigned RayCaster::free_segments(const Eigen::Vector3d& origin, std::span<const Segment> segments) const {
+  return free_segments(std::span(&origin, 1), segments);
+}
+
+unsigned RayCaster::free_segments(std::span<const Eigen::Vector3d> origins,
+                                  std::span<const Segment> segments) const {
   EVPOSE_CHECK(segments.size() <= kMostSegments);
-  const Eigen::Vector3f from = origin.cast<float>();
+  EVPOSE_CHECK(origins.size() == 1 || origins.size() == segments.size());
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRay8 rays{};
   alignas(32) std::array<int, kMostSegments> valid{};
   for (std::size_t i = 0; i < segments.size(); ++i) {
     valid[i] = -1;
+    const Eigen::Vector3f from = origins[origins.size() == 1 ? 0 : i].cast<float>();
     rays.org_x[i] = from.x();
     rays.org_y[i] = from.y();
     rays.org_z[i] = from.z();

@@ -60,6 +60,8 @@ class RayCaster {
   /// than occluded() for each.
   static constexpr std::size_t kMostSegments = 8;
   unsigned free_segments(const Eigen::Vector3d& origin, std::span<const Segment> segments) const;
+  /// The same from an origin for each.
+  unsigned free_segments(std::span<const Eigen::Vector3d> origins, std::span<const Segment> segments) const;
 
   const Scene& scene() const { return scene_; }
 

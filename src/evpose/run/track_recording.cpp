@@ -51,22 +51,6 @@ Status check_units(const std::vector<ImuSample>& samples, const Recording& recor
   return check_gyro_against(truth, samples, recording.imu_path);
 }
 
-/// The map of the request, or the recording's own.
-Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
-                                                     const Recording& recording) {
-  std::string path = request.map;
-  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
-  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
-  auto map = read_contour_map(path);
-  if (!map) return map.error();
-  if (!request.occluders.empty()) {
-    auto mesh = read_ply_mesh(request.occluders, map->anchor);
-    if (!mesh) return mesh.error();
-    map->occluders = std::move(*mesh);
-  }
-  return std::make_shared<const ContourMap>(std::move(*map));
-}
-
 /// Draws the map over the time surface at even intervals of the run, for the report.
 class OverlayWriter {
  public:
@@ -100,6 +84,21 @@ Status write_learnt_map(const std::string& path, const ContourMap& map, const Tr
 }
 
 }  // namespace
+
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
+                                                     const Recording& recording) {
+  std::string path = request.map;
+  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
+  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
+  auto map = read_contour_map(path);
+  if (!map) return map.error();
+  if (!request.occluders.empty()) {
+    auto mesh = read_ply_mesh(request.occluders, map->anchor);
+    if (!mesh) return mesh.error();
+    map->occluders = std::move(*mesh);
+  }
+  return std::make_shared<const ContourMap>(std::move(*map));
+}
 
 double wall_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

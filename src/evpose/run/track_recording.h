@@ -51,6 +51,8 @@ struct TrackJob {
   TrackerSetup setup;
   std::vector<Error> findings;  ///< what looks wrong although it can be tracked
 };
+/// The map of the request, or the recording's own.
+Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request, const Recording& recording);
 /// The job on a recording that is known, with the map of the request or the recording's own.
 Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,
                             std::vector<TimedPose> truth);

@@ -253,7 +253,13 @@ std::optional<std::string> find_calibration(const Look& look) {
   return any;
 }
 
-/// The first file that looks like IMU text.
+/// An autopilot's log: it has the ending of some event files, and an IMU, but no events.
+bool is_autopilot_log(const std::string& path) {
+  const auto format = find_event_format(path, "");
+  return format && std::string_view((*format)->name) == "dataflash";
+}
+
+/// The first file that looks like IMU text, else an autopilot's log.
 std::optional<std::string> find_imu(const Look& look) {
   for (const std::string& name : look.files()) {
     const std::string own = base_name(name);
@@ -261,6 +267,8 @@ std::optional<std::string> find_imu(const Look& look) {
     if (!kind || own.find("imu") == std::string::npos) continue;
     if (recognise_imu_text(look.path(name))) return name;
   }
+  for (const std::string& name : look.files())
+    if ((name.ends_with(".bin") || name.ends_with(".BIN")) && is_autopilot_log(look.path(name))) return name;
   return std::nullopt;
 }
 
@@ -283,7 +291,7 @@ std::optional<std::string> find_events(const Look& look) {
     if (auto name = look.find(usual)) return name;
   for (const std::string& name : look.files())
     if (holds_events(name) && base_name(name).find("map") == std::string::npos &&
-        base_name(name).find("right") == std::string::npos)
+        base_name(name).find("right") == std::string::npos && !is_autopilot_log(look.path(name)))
       return name;
   return std::nullopt;
 }

@@ -57,7 +57,7 @@ class Bench:
 
     def track(self, folder, contours, output, *extra):
         """The summary of a run."""
-        self.run("track", folder, "--map", contours, "-o", output, *extra)
+        self.run("track", folder, "--map", contours, "-o", output, "--force", *extra)
         return json.loads((pathlib.Path(output) / "summary.json").read_text())
 
     def later_accuracy(self, run, truth):

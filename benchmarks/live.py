@@ -67,7 +67,7 @@ class Served:
         set_words = [w for s in (f"mavlink.rate_hz={RATE_HZ}", *settings) for w in ("--set", s)]
         self.process = self._start(bench.evpose, "-q", "serve", recording.folder, "--map", recording.contours, "--occluders",
                                    recording.mesh, "--mavlink", f"udp://127.0.0.1:{link}", "--view", page, "-o", out,
-                                   *set_words)
+                                   "--force", *set_words)
         self.stop = threading.Event()
         self.reader = threading.Thread(target=read_stream, args=(page, self.stop))
         self.reader.start()

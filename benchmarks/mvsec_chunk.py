@@ -162,7 +162,7 @@ def main():
     write_recording(chunk, points, from_s, args.out / "recording")
     # The points stand where events were, half a pixel more or less, which is 4 mm at 2 m.
     command = [args.evpose, "-q", "track", args.out / "recording", "--init", "groundtruth", "-o", args.out / "run",
-               "--set", "registration.map_sigma_m=0.004"]
+               "--force", "--set", "registration.map_sigma_m=0.004"]
     for value in args.set:
         command += ["--set", value]
     tracked = subprocess.run([str(c) for c in command], capture_output=True, text=True, stdin=subprocess.DEVNULL)

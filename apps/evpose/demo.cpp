@@ -44,6 +44,7 @@ int demo(const std::string& folder, const sim::Scenario& scenario, int threads) 
   request.recording = recording;
   request.occluders = recording + "/mesh.ply";
   request.output = folder + "/run";
+  request.replace = true;  // as the recording
   return report_run(track_recording(request));
 }
 

@@ -70,6 +70,7 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   auto* speed_option = command->add_option(
       "--speed", *speed, "of a recording against the wall clock; 0: as fast as it is tracked, nothing shed");
   command->add_option("-o,--output", track.output, "run folder; default: none is written");
+  command->add_flag("--force", track.replace, "replace an earlier run in the run folder");
   command->add_option("--config", track.config_file, "YAML file with settings");
   command->add_option("--set", track.assignments, "one setting, key=value")->allow_extra_args(false);
   command->add_flag("--dump-config", *dump, "print all settings and stop");

@@ -62,7 +62,7 @@ Status Outputs::open(const ServeRequest& request, const ServeConfig& config, con
                                                     [this](mavlink::Bytes frame) { link_->send(frame); });
   }
   if (!request.track.output.empty()) {
-    auto run = RunFolder::create(request.track.output);
+    auto run = RunFolder::create(request.track.output, request.track.replace);
     if (!run) return run.error();
     run_ = std::make_unique<RunFolder>(std::move(*run));
   }

@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "evpose/run/track_recording.h"
+#include "interrupt.h"
 
 namespace evpose {
 namespace {
@@ -16,6 +17,16 @@ int dump_config(const TrackRequest& request) {
   describe(table, *config);
   std::fputs(table.to_yaml().c_str(), stdout);
   return 0;
+}
+
+/// An interruption ends the run; what was tracked until then is written.
+int run_track(TrackRequest request) {
+  const InterruptGuard guard;
+  request.interrupted = InterruptGuard::interrupted;
+  const auto outcome = track_recording(request);
+  if (!InterruptGuard::interrupted()) return report_run(outcome);
+  if (outcome) report_run(outcome);
+  return kInterruptedStatus;
 }
 
 }  // namespace
@@ -50,6 +61,7 @@ void add_track(CLI::App& app, std::function<int()>& run) {
       ->check(CLI::Range(0.0, 10.0));
   request->output = "run";
   command->add_option("-o,--output", request->output, "run folder")->capture_default_str();
+  command->add_flag("--force", request->replace, "replace an earlier run in the run folder");
   command->add_option("--learn-map", request->learnt_map,
                       "map.h5 to write: the map with the signs of contrast that the events have told");
   command->add_option("--preset", request->preset,
@@ -59,7 +71,7 @@ void add_track(CLI::App& app, std::function<int()>& run) {
   auto* dump_flag = command->add_flag("--dump-config", *dump, "print all settings and stop");
   command->callback([=, &run] {
     if (!*dump && recording->count() == 0) throw CLI::RequiredError(recording->get_name());
-    run = [=] { return *dump ? dump_config(*request) : report_run(track_recording(*request)); };
+    run = [=] { return *dump ? dump_config(*request) : run_track(*request); };
   });
   (void)dump_flag;
 }

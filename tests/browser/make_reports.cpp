@@ -75,7 +75,7 @@ RgbImage picture(int which) {
 }
 
 Status make(const std::string& folder) {
-  auto made = RunFolder::create(folder + "/run");
+  auto made = RunFolder::create(folder + "/run", true);
   if (!made) return made.error();
   Run run;
   for (int i = 0; i <= 2400; ++i) made->add(run.at(i));

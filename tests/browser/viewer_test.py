@@ -114,8 +114,8 @@ def live(browser, recording):
 
 
 def recorded(browser, recording):
-    subprocess.run([EVPOSE, "-q", "track", recording, "--map", recording / "contours.ply", "-o", FOLDER / "run"], check=True,
-                   capture_output=True, timeout=60)
+    subprocess.run([EVPOSE, "-q", "track", recording, "--map", recording / "contours.ply", "-o", FOLDER / "run", "--force"],
+                   check=True, capture_output=True, timeout=60)
     port = free_port()
     with Program("view", FOLDER / "run", "--map", recording / "contours.ply", "--port", port):
         for _ in range(200):

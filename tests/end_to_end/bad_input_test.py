@@ -40,7 +40,7 @@ class BadInputTest(unittest.TestCase):
         before = self.root / "run"
         before.mkdir(exist_ok=True)
         (before / "summary.json").write_text("of an earlier run")
-        result = self.track(folder, *more, map_file=map_file)
+        result = self.track(folder, "--force", *more, map_file=map_file)
         message = result.stderr
         self.assertEqual(result.returncode, 2, f"status {result.returncode}: {message}{result.stdout}")
         self.assertEqual(message.count("\n"), 1, f"not one line: {message!r}")
@@ -188,6 +188,17 @@ class BadInputTest(unittest.TestCase):
         folder = self.written()
         (folder / "recording.yaml").write_text("version: 1\nimu:\n  acel_unit: g\n")
         self.refused(folder, says=[r"recording\.yaml:3", "acel_unit", "accel_unit"])
+
+    def test_an_earlier_run_is_replaced_only_by_force(self):
+        folder = self.written()
+        self.assertEqual(self.track(folder).returncode, 0)
+        before = (self.root / "run/latency.csv").read_bytes()
+        result = self.track(folder)
+        self.assertEqual(result.returncode, 2, result.stdout)
+        self.assertRegex(result.stderr, r"^evpose: .*run: holds an earlier run; .*--force.*-o\n$")
+        self.assertEqual((self.root / "run/latency.csv").read_bytes(), before)
+        self.assertEqual(self.track(folder, "--force").returncode, 0)
+        self.assertNotEqual((self.root / "run/latency.csv").read_bytes(), before)
 
     def test_a_folder_that_is_no_run_is_not_replaced(self):
         (self.root / "run").mkdir()

@@ -3,9 +3,11 @@
 """A run that goes wrong says why, and its exit status is 1. bad_run_test.py EVPOSE"""
 import json
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 try:
@@ -95,6 +97,29 @@ class BadRunTest(unittest.TestCase):
         told = subprocess.run([EVPOSE, "info", cloud], capture_output=True, text=True, timeout=60)
         self.assertEqual(told.returncode, 0, told.stderr)
         self.assertIn("evpose map build", told.stdout)
+
+    def test_an_interrupted_run_is_complete_up_to_there(self):
+        self.recording = Recording(duration_s=8)
+        self.recording.write(self.root / "recording")
+        command = [EVPOSE, "track", self.root / "recording", "-o", self.root / "run", "--set", "packet_ms=0.01",
+                   "--set", "rate_hz=2000"]
+        process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True, stdin=subprocess.DEVNULL)
+        states = None
+        while not states and process.poll() is None:  # until some of it is tracked
+            time.sleep(0.01)
+            states = [path for path in self.root.glob(".run.partial-*/*") if path.stat().st_size > 100_000]
+        self.assertIsNone(process.poll(), "ended before it could be interrupted: give it more to do")
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, err)
+        self.assertIn("; interrupted", out)
+        for name in ("trajectory.tum", "states.csv", "summary.json", "report.html", "config.yaml"):
+            self.assertGreater((self.root / "run" / name).stat().st_size, 0, name)
+        self.assertTrue(self.summary()["interrupted"])
+        last_s = np.loadtxt(self.root / "run/trajectory.tum")[-1, 0]
+        self.assertTrue(0 < last_s < 7.9, last_s)
+        self.assertEqual({path.name for path in self.root.iterdir()}, {"recording", "run"})
 
     def test_events_without_contours(self):
         rows = len(self.recording.contours)

@@ -19,7 +19,8 @@ MAPS = {"room_spiral": "room", "room_720p": "room", "room_people": "room", "room
 
 def track(out, recording, *more):
     maps, name = SHARED / "data/peer/maps", MAPS[recording]
-    command = [EVPOSE, "-q", "track", SHARED / "data/peer" / recording, "--map", maps / f"{name}_contours.ply", "-o", out]
+    command = [EVPOSE, "-q", "track", SHARED / "data/peer" / recording, "--map", maps / f"{name}_contours.ply", "-o", out,
+               "--force"]
     result = subprocess.run([str(word) for word in command + list(more)], capture_output=True, text=True,
                             timeout=300, stdin=subprocess.DEVNULL)
     if result.returncode not in (0, 1):  # 1: not tracked well; the figures tell

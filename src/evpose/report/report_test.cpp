@@ -93,8 +93,8 @@ struct Settings {
   std::string name = "x: y";
 };
 
-Expected<RunOutcome> write_run(const std::string& path, double wall_s = 1e-4) {
-  auto folder = RunFolder::create(path);
+Expected<RunOutcome> write_run(const std::string& path, double wall_s = 1e-4, bool replace = false) {
+  auto folder = RunFolder::create(path, replace);
   if (!folder) return folder.error();
   for (int i = 0; i <= 150; ++i) folder->add(update_at(i, wall_s));
   folder->add_overlay("at 1 s", RgbImage(8, 6));
@@ -214,18 +214,22 @@ TEST(RunFolder, SameEstimatesGiveTheSameBytes) {
   EXPECT_NE(content(folder.file("a/latency.csv")), content(folder.file("b/latency.csv")));
 }
 
-TEST(RunFolder, ReplacesAnEarlierRunOnlyWhenFinished) {
+TEST(RunFolder, ReplacesAnEarlierRunOnlyIfAskedToAndWhenFinished) {
   const Folder folder;
   ASSERT_TRUE(write_run(folder.file("run/")));
   const std::string before = content(folder.file("run/latency.csv"));
   {
-    auto unfinished = RunFolder::create(folder.file("run"));
+    auto unfinished = RunFolder::create(folder.file("run"), true);
     ASSERT_TRUE(unfinished);
     unfinished->add(update_at(0, 1));
   }
   EXPECT_EQ(content(folder.file("run/latency.csv")), before);
   EXPECT_EQ(folder.names().size(), 1u);
-  ASSERT_TRUE(write_run(folder.file("run"), 3e-4));
+  const auto refused = write_run(folder.file("run"), 3e-4);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().line().find("holds an earlier run; replace it with --force"), std::string::npos);
+  EXPECT_EQ(content(folder.file("run/latency.csv")), before);
+  ASSERT_TRUE(write_run(folder.file("run"), 3e-4, true));
   EXPECT_NE(content(folder.file("run/latency.csv")), before);
   EXPECT_EQ(folder.names().size(), 1u);
 }
@@ -236,19 +240,20 @@ TEST(RunFolder, LeavesOtherThingsAlone) {
   std::ofstream(folder.file("mine/thesis.tex")) << "work of years";
   std::ofstream(folder.file("file")) << "a file";
   fs::create_directories(folder.file("empty"));
-  EXPECT_NE(RunFolder::create(folder.file("mine")).error().line().find("thesis.tex"), std::string::npos);
-  EXPECT_FALSE(RunFolder::create(folder.file("file")));
-  EXPECT_FALSE(RunFolder::create(folder.file("no/such/parent")));
-  EXPECT_FALSE(RunFolder::create(""));
-  EXPECT_FALSE(RunFolder::create("/"));
-  EXPECT_FALSE(RunFolder::create(".."));
-  EXPECT_TRUE(RunFolder::create(folder.file("empty")));
+  EXPECT_NE(RunFolder::create(folder.file("mine"), true).error().line().find("thesis.tex"),
+            std::string::npos);
+  EXPECT_FALSE(RunFolder::create(folder.file("file"), true));
+  EXPECT_FALSE(RunFolder::create(folder.file("no/such/parent"), true));
+  EXPECT_FALSE(RunFolder::create("", true));
+  EXPECT_FALSE(RunFolder::create("/", true));
+  EXPECT_FALSE(RunFolder::create("..", true));
+  EXPECT_TRUE(RunFolder::create(folder.file("empty"), true));
   EXPECT_EQ(folder.names().size(), 3u);
 }
 
 TEST(RunFolder, OfARunWithoutUpdatesOrTruthIsComplete) {
   const Folder folder;
-  auto run = RunFolder::create(folder.file("run"));
+  auto run = RunFolder::create(folder.file("run"), true);
   ASSERT_TRUE(run);
   ConfigTable table;
   RunSummary summary;

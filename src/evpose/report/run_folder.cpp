@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 constexpr std::array kFiles{"trajectory.tum", "trajectory_camera.tum", "states.csv",  "states_imu.csv",
                             "latency.csv",    "summary.json",          "config.yaml", "report.html"};
 
-/// Nothing, an empty folder, or an earlier run may be replaced.
-Status check_place(const fs::path& place) {
+/// Nothing, an empty folder, or if asked for an earlier run may be replaced.
+Status check_place(const fs::path& place, bool replace) {
   std::error_code error;
   const fs::file_status status = fs::symlink_status(place, error);
   if (status.type() == fs::file_type::not_found) return {};
@@ -41,6 +41,9 @@ Status check_place(const fs::path& place) {
   if (error) return Error{place.string(), "cannot be read: " + error.message(), fix};
   if (!empty && !has_summary)
     return Error{place.string(), "is not a run folder of evpose: it has no summary.json", fix};
+  if (!empty && !replace)
+    return Error{place.string(), "holds an earlier run",
+                 "replace it with --force, or give another name with -o"};
   return {};
 }
 
@@ -69,6 +72,7 @@ struct RunFolder::State {
   std::optional<AtomicFile> states, latency, states_imu;
   StateLog log;
   std::vector<OverlayPicture> overlays;
+  bool replace = false;  ///< what stands there
   bool finished = false;
 
   ~State() {
@@ -95,7 +99,7 @@ Status RunFolder::State::write_trajectories(const Pose& T_body_cam) const {
 
 Status RunFolder::State::move_into_place() {
   // The place may have changed since the start of the run.
-  if (Status free = check_place(place); !free) return free;
+  if (Status free = check_place(place, replace); !free) return free;
   std::error_code error;
   const fs::path old = folder.string() + ".old";
   const bool replaces = fs::exists(place, error);
@@ -117,17 +121,18 @@ RunFolder::RunFolder(RunFolder&&) noexcept = default;
 RunFolder& RunFolder::operator=(RunFolder&&) noexcept = default;
 RunFolder::~RunFolder() = default;
 
-Expected<RunFolder> RunFolder::create(const std::string& path) {
+Expected<RunFolder> RunFolder::create(const std::string& path, bool replace) {
   fs::path place = fs::path(path).lexically_normal();
   if (!place.has_filename()) place = place.parent_path();  // "run/" is "run"
   const std::string name = place.filename().string();
   if (name.empty() || name == "." || name == "..")
     return Error{path.empty() ? "output" : path, "is no name for a run folder",
                  "give the name of a folder to make"};
-  if (const Status free = check_place(place); !free) return free.error();
+  if (const Status free = check_place(place, replace); !free) return free.error();
 
   auto state = std::make_unique<State>();
   state->place = place;
+  state->replace = replace;
   const fs::path folder = place.parent_path() / text(".", name, ".partial-", ::getpid());
   std::error_code error;
   const bool made = fs::create_directory(folder, error);

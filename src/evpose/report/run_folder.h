@@ -26,6 +26,7 @@ struct RunSummary {
   std::string subtitle;         ///< e.g. the map's name and how the run was started
   std::string start;            ///< where the start pose came from: "started from ground truth"
   std::vector<Error> findings;  ///< what looked wrong with the input before the run
+  bool interrupted = false;     ///< before the recording's end
   Pose T_body_cam;
   std::vector<TimedPose> truth;             ///< T_map_body; empty where not known
   std::vector<Eigen::Vector3d> map_points;  ///< map frame, metres; drawn, thinned out
@@ -52,9 +53,10 @@ struct RunOutcome {
 /// "resources" and "rate_mev_s" in summary.json.
 class RunFolder {
  public:
-  /// Errors: the place's parent does not exist or cannot be written; something stands there that is not an
-  /// empty folder or an earlier run.
-  static Expected<RunFolder> create(const std::string& path);
+  /// `replace`: an earlier run that stands there, once this one is finished. Errors: the place's parent does
+  /// not exist or cannot be written; something stands there that is not an empty folder or, if it may be
+  /// replaced, an earlier run.
+  static Expected<RunFolder> create(const std::string& path, bool replace);
   RunFolder(RunFolder&&) noexcept;
   RunFolder& operator=(RunFolder&&) noexcept;
   /// Removes what was written unless finished.

@@ -156,6 +156,7 @@ std::string summary_json(const StateLog& log, const RunSummary& summary, const C
                          const std::optional<TrajectoryScore>& score, const RunVerdict& verdict) {
   Json out;
   out["status"] = status_word(log.rows.empty() ? Health::waiting : log.rows.back().health);
+  if (summary.interrupted) out["interrupted"] = true;
   out["tracking_share"] = rounded(verdict.tracking_share);
   out["problems"] = problems_json(verdict);
   out["findings"] = Json::array();
@@ -198,6 +199,7 @@ std::string summary_text(const StateLog& log, const RunSummary& summary,
                          status_word(at_end).c_str(), log.rows.size(), data_seconds(log),
                          log.health.empty() ? 0 : log.health.size() - 1);
   if (!summary.start.empty()) out += "; " + summary.start;
+  if (summary.interrupted) out += "; interrupted";
   if (score && score->pairs > 0) {
     out += line("\nposition error: mean %.2f mm, p95 %.2f mm, largest %.2f mm", score->ate_mm.mean,
                 score->ate_mm.p95, score->ate_mm.max);

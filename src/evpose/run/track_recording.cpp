@@ -210,7 +210,7 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
 }
 
 Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
-                      const std::function<void(double)>& progress) {
+                      const std::function<bool(double)>& progress) {
   auto reader = open_events(recording, 1e-3 * config.packet_ms);
   if (!reader) return reader.error();
   std::unique_ptr<ImuReader> imu;
@@ -237,9 +237,9 @@ Status feed_recording(const Recording& recording, const RunConfig& config, Track
       imu_until = sample.t;
     }
     tracker.add_events(packet);
-    if (progress)
-      progress(to_seconds(end - recording.first_ns) /
-               std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns)));
+    if (progress && !progress(to_seconds(end - recording.first_ns) /
+                              std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns))))
+      return {};
   }
 }
 
@@ -249,7 +249,7 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   auto job = prepare(request, *asked);
   if (!job) return job.error();
   RunConfig& config = job->config;
-  auto run = RunFolder::create(request.output);
+  auto run = RunFolder::create(request.output, request.replace);
   if (!run) return run.error();
   auto tracker = Tracker::create(job->setup, config.tracker, job->start, wall_s);
   if (!tracker) return tracker.error();
@@ -267,14 +267,18 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
 
   const double wall_start = wall_s(), cpu_start = cpu_s();
   Progress progress("tracking");
-  if (auto ok = feed_recording(job->recording, config, **tracker, [&](double share) { progress.at(share); });
-      !ok)
-    return ok.error();
+  bool interrupted = false;
+  const auto go_on = [&](double share) {
+    progress.at(share);
+    interrupted = request.interrupted && request.interrupted();
+    return !interrupted;
+  };
+  if (auto ok = feed_recording(job->recording, config, **tracker, go_on); !ok) return ok.error();
   progress.done();
   if (updates == 0)
     return Error{request.recording, "the streams end before the first update",
                  "check that events and IMU cover the start"};
-  if (most_points == 0)
+  if (most_points == 0 && !interrupted)
     return Error{job->map->source,
                  text("none of the map's ", job->map->points.size(), " points ever comes into view"),
                  (job->findings.empty() ? "" : job->findings.front().line() + "; ") +
@@ -283,6 +287,7 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
     if (auto ok = write_learnt_map(request.learnt_map, *job->map, **tracker); !ok) return ok.error();
 
   RunSummary summary = summarise(*job, request, **tracker);
+  summary.interrupted = interrupted;
   summary.wall_s = wall_s() - wall_start;
   summary.cpu_s = cpu_s() - cpu_start;
   summary.peak_memory_mb = peak_memory_mb();

@@ -35,6 +35,8 @@ struct TrackRequest {
   std::string config_file;               ///< optional YAML
   std::string learnt_map;                ///< map.h5 to write, with the contrast learnt; empty: none
   std::vector<std::string> assignments;  ///< "key=value"
+  bool replace = false;                  ///< an earlier run in the run folder
+  std::function<bool()> interrupted;     ///< asked after each packet; true ends the run there
 };
 
 /// Settings after the file and the assignments of the request.
@@ -59,9 +61,9 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
 /// Reads and checks everything but the events.
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
 /// Gives the tracker both streams of the recording, the IMU ahead so that no event has to wait for it.
-/// `progress`, if any, is told the share of the recording, 0..1.
+/// `progress`, if any, is told the share of the recording, 0..1, and ends it by false.
 Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
-                      const std::function<void(double)>& progress);
+                      const std::function<bool(double)>& progress);
 /// What the run folder is told at the end; without times and memory.
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker);
 
@@ -69,7 +71,8 @@ double wall_s();          ///< on a monotone clock
 double cpu_s();           ///< processor time of the program
 double peak_memory_mb();  ///< of the program
 
-/// The main job: recording and map in, run folder out. Nothing is written on error.
+/// The main job: recording and map in, run folder out. Nothing is written on error. A run that is interrupted
+/// is complete up to there.
 Expected<RunOutcome> track_recording(const TrackRequest& request);
 
 }  // namespace evpose

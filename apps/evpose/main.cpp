@@ -7,13 +7,14 @@
 #include "commands.h"
 #include "evpose/core/log.h"
 #include "evpose/core/version.h"
+#include "usage.h"
 
 namespace evpose {
 namespace {
 
 int run_program(int argc, char** argv) {
   CLI::App app{"evpose: where the drone is, from events, IMU and a prior 3D map"};
-  app.set_version_flag("--version", std::string("evpose ") + version());
+  app.set_version_flag("-V,--version", std::string("evpose ") + version());
   app.require_subcommand(1);
   app.footer(
       "Exit status: 0 done; 1 ran, but less than 90 % of it was tracked or a check failed; 2 bad input or "
@@ -40,6 +41,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e);  // --help, --version
   } catch (const CLI::ParseError& e) {
+    if (const auto wrong = find_unknown_word(app, {argv + 1, argv + argc})) return bad_input(*wrong);
     std::fprintf(stderr, "evpose: %s; see evpose --help\n", e.what());
     return 2;
   }

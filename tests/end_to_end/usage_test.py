@@ -25,7 +25,8 @@ class UsageTest(unittest.TestCase):
                 self.assertIn("--help", result.stdout)
 
     def test_version_is_three_numbers(self):
-        self.assertRegex(run("--version").stdout, r"^evpose \d+\.\d+\.\d+\n$")
+        for flag in ("--version", "-V"):
+            self.assertRegex(run(flag).stdout, r"^evpose \d+\.\d+\.\d+\n$")
 
     def test_wrong_usage_is_status_2_and_one_line(self):
         for words in ([], ["trakc"], ["track"], ["track", "--no-such-option"], ["eval", "one"],
@@ -35,6 +36,18 @@ class UsageTest(unittest.TestCase):
                 self.assertEqual(result.returncode, 2)
                 self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
                 self.assertTrue(result.stderr.startswith("evpose: "), result.stderr)
+
+    def test_a_slip_gets_the_nearest_word(self):
+        for words, nearest in ((["trakc"], "track"), (["-q", "mapp"], "map"), (["map", "biuld", "a.ply"], "build"),
+                               (["track", "a", "--mpa", "b"], "--map"), (["track", "a", "--init_sigma=1,2"], "--init-sigma"),
+                               (["chekc", "a", "--map", "b"], "check"), (["bench", "unsen"], "unseen")):
+            with self.subTest(words=words):
+                result = run(*words)
+                self.assertEqual(result.returncode, 2)
+                self.assertRegex(result.stderr, rf"^evpose: .*: is no (command|option) of evpose.*; did you mean '{nearest}'\?.*\n$")
+        for words in (["frobnicate"], ["track", "a", "--quux"]):
+            with self.subTest(words=words):
+                self.assertRegex(run(*words).stderr, r"^evpose: .*: is no (command|option) of evpose.*; see evpose.*--help\n$")
 
 
 if __name__ == "__main__":

@@ -31,6 +31,8 @@ std::string outside(const ConfigTable::Bounds& b, double v, const std::string& u
   return text(format(v), " is outside ", format(b.min), " .. ", format(b.max), unit.empty() ? "" : " ", unit);
 }
 
+}  // namespace
+
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -45,8 +47,6 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   }
   return row[b.size()];
 }
-
-}  // namespace
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
   std::string best;

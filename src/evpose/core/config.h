@@ -81,6 +81,9 @@ class ConfigTable {
   std::string prefix_;
 };
 
+/// Letters to insert, remove or replace to make one of the other (Levenshtein).
+std::size_t edit_distance(const std::string& a, const std::string& b);
+
 /// The member of `known` nearest to `word` by edit distance; empty if there is none.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known);
 

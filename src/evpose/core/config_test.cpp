@@ -93,5 +93,18 @@ TEST(ConfigTable, ReprintedNumbersReadBackExactly) {
   EXPECT_EQ(c.rate_hz, third);
 }
 
+TEST(Words, EditDistanceIsAMetric) {
+  const std::vector<std::string> words{"",     "a",   "track",  "trakc",  "tracks",
+                                       "rack", "map", "kitten", "sitting"};
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
+  EXPECT_EQ(edit_distance("", "map"), 3u);
+  for (const auto& a : words)
+    for (const auto& b : words) {
+      EXPECT_EQ(edit_distance(a, b), edit_distance(b, a));
+      EXPECT_EQ(edit_distance(a, b) == 0, a == b);
+      for (const auto& c : words) EXPECT_LE(edit_distance(a, c), edit_distance(a, b) + edit_distance(b, c));
+    }
+}
+
 }  // namespace
 }  // namespace evpose

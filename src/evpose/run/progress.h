@@ -2,9 +2,21 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 namespace evpose {
+
+/// How long a job still takes, as far as that can be told: not in its first seconds, and never more than was
+/// said before; nothing while it turns out to take much longer than that.
+class RemainingTime {
+ public:
+  /// After `spent_s` seconds `fraction` (0..1) of it is done.
+  std::optional<double> at(double fraction, double spent_s);
+
+ private:
+  std::optional<double> said_s_;
+};
 
 /// "tracking  43 %, 12 s left" on a terminal's stderr, redrawn a few times a second; silent elsewhere.
 class Progress {
@@ -20,6 +32,8 @@ class Progress {
  private:
   std::string what_;
   bool shown_ = false, on_;
+  double largest_ = 0;  ///< fraction shown
+  RemainingTime remaining_;
   std::chrono::steady_clock::time_point start_, last_;
 };
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "evpose/run/plausibility.h"
+#include "evpose/run/progress.h"
 #include "evpose/run/start.h"
 
 namespace evpose {
@@ -69,6 +70,31 @@ TEST(Plausibility, AStartWhoseUpIsNotThatOfTheAccelerometerIsDoubtedByTheAngle) 
   start.t = from_seconds(5);  // after the samples: nothing can be said
   EXPECT_FALSE(doubt_start_attitude(samples, start, "imu.csv"));
   EXPECT_FALSE(doubt_start_attitude({}, start, "imu.csv"));
+}
+
+TEST(RemainingTime, OfASteadyJobIsRightAfterItsFirstSeconds) {
+  RemainingTime remaining;
+  for (double spent_s = 0.1; spent_s < 3; spent_s += 0.1) EXPECT_FALSE(remaining.at(spent_s / 60, spent_s));
+  for (double spent_s = 3.1; spent_s < 60; spent_s += 1)
+    EXPECT_NEAR(remaining.at(spent_s / 60, spent_s).value(), 60 - spent_s, 1e-9);
+  EXPECT_EQ(remaining.at(1, 60), 0);
+  EXPECT_FALSE(RemainingTime().at(0, 100));
+}
+
+TEST(RemainingTime, NeverGrowsAndIsSilentWhileItIsWrong) {
+  RemainingTime remaining;
+  double last_s = 1e9, spent_s = 0;
+  int silent = 0;
+  // Fast, then slow, then fast again.
+  for (double fraction = 0; fraction <= 1; fraction += 0.001) {
+    spent_s += fraction > 0.4 && fraction < 0.6 ? 0.2 : 0.02;
+    const auto left_s = remaining.at(fraction, spent_s);
+    silent += spent_s > 10 && !left_s ? 1 : 0;
+    EXPECT_LE(left_s.value_or(last_s), last_s);
+    last_s = left_s.value_or(last_s);
+  }
+  EXPECT_GT(silent, 100);
+  EXPECT_LT(last_s, 0.2);
 }
 
 TEST(Start, WordsTellWhereThePoseComesFrom) {

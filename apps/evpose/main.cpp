@@ -36,6 +36,7 @@ int run_program(int argc, char** argv) {
   add_view(app, run);
   add_mavlink(app, run);
   add_bench(app, run);
+  add_manual(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

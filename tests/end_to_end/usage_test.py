@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line explains itself and refuses what it does not know. usage_test.py EVPOSE"""
+import pathlib
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 import unittest
 
 EVPOSE = None
@@ -48,6 +51,29 @@ class UsageTest(unittest.TestCase):
         for words in (["frobnicate"], ["track", "a", "--quux"]):
             with self.subTest(words=words):
                 self.assertRegex(run(*words).stderr, r"^evpose: .*: is no (command|option) of evpose.*; see evpose.*--help\n$")
+
+    def test_the_man_page_and_the_completion_hold_what_the_help_does(self):
+        with tempfile.TemporaryDirectory() as folder:
+            man, bash = (pathlib.Path(folder) / name for name in ("evpose.1", "evpose.bash"))
+            self.assertEqual(run("manual", "--man", man, "--bash", bash).returncode, 0)
+            page = man.read_text().replace("\\-", "-")
+            for command in (["track"], ["map", "build"], ["mavlink", "check"]):
+                self.assertIn(f".SS evpose {' '.join(command)}\n", page)
+                for option in re.findall(r"^  (?:-\w,)?(--[a-z-]+)", run(*command, "--help").stdout, re.MULTILINE):
+                    self.assertIn(option, page)
+                    self.assertIn(option, self.completed(bash, *command, option[:-1]))
+            if shutil.which("groff"):
+                told = subprocess.run(["groff", "-man", "-ww", "-Tutf8", man], capture_output=True, text=True, timeout=60)
+                self.assertEqual((told.returncode, told.stderr), (0, ""))
+            self.assertEqual(self.completed(bash, "tra"), ["track"])
+            self.assertEqual(self.completed(bash, "-q", "map", "b"), ["build"])
+            self.assertEqual(self.completed(bash, "track", "fligh"), [], "files are the shell's own")
+
+    def completed(self, bash, *words):
+        script = 'source "$1"; shift; COMP_WORDS=(evpose "$@"); COMP_CWORD=$#; _evpose; printf "%s\\n" "${COMPREPLY[@]}"'
+        done = subprocess.run(["bash", "-uc", script, "-", str(bash), *words], capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.stderr, "")
+        return done.stdout.split()
 
 
 if __name__ == "__main__":

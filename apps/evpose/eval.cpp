@@ -48,7 +48,7 @@ ScoreOptions options_of(const EvalRequest& request) {
   return options;
 }
 
-std::string span_text(const std::vector<TimedPose>& trajectory) {
+std::string times_in_words(const std::vector<TimedPose>& trajectory) {
   char out[100];
   std::snprintf(out, sizeof out, "%.3f .. %.3f s", 1e-9 * static_cast<double>(trajectory.front().t),
                 1e-9 * static_cast<double>(trajectory.back().t));
@@ -67,8 +67,8 @@ int eval(const EvalRequest& request) {
   if (score.pairs == 0)
     return bad_input(
         {request.estimate,
-         text("fewer than two poses have a partner in ", request.truth, " (estimate ", span_text(*estimate),
-              ", ground truth ", span_text(*truth), ")"),
+         text("fewer than two poses have a partner in ", request.truth, " (estimate ",
+              times_in_words(*estimate), ", ground truth ", times_in_words(*truth), ")"),
          "check that both share one clock, or widen --from, --to, --max-gap or --max-difference"});
   if (!request.plot.empty()) {
     const std::string page =

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "evpose/sim/light/panes.h"
+
 namespace evpose::sim {
 namespace {
 
@@ -50,7 +52,9 @@ Status check_flight(const RayCaster& rays, const CameraPath& path, double durati
     };
     if (!position.allFinite())
       return Error{"trajectory", where() + ": not a number", "correct the trajectory"};
-    const Surroundings surroundings = probe_surroundings(rays, position);
+    Surroundings surroundings = probe_surroundings(rays, position);
+    for (const Pane& pane : rays.scene().panes)
+      surroundings.nearest = std::min(surroundings.nearest, static_cast<float>(distance(pane, position)));
     if (2 * surroundings.behind > surroundings.met)
       return Error{"trajectory", where() + ": the camera is inside of something", "move the trajectory"};
     if (surroundings.nearest < kNearest_m)

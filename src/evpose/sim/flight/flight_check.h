@@ -10,7 +10,7 @@
 namespace evpose::sim {
 
 /// Checks a flight before it is rendered. Errors, with the time: the camera is inside of a body or nearer
-/// than 3 cm to a surface; the optical flow exceeds `max_flow_px_s`.
+/// than 3 cm to a surface or a pane; the optical flow exceeds `max_flow_px_s`.
 Status check_flight(const RayCaster& rays, const CameraPath& path, double duration_s, double focal_px,
                     double max_flow_px_s);
 

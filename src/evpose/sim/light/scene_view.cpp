@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <type_traits>
 #include <utility>
 
 #include "evpose/sim/world/texture.h"
@@ -67,11 +69,13 @@ FloatLanes moving_light(const PreparedScene& prepared, const SceneView& view, co
 
 SceneView make_scene_view(const PreparedScene& prepared, double t_s, const Pose& T_map_cam) {
   EVPOSE_CHECK(prepared.channels.switching.size() <= kMostChannels);
-  SceneView view{t_s, T_map_cam, T_map_cam.rotation(), prepared.channels.factors(t_s), {}, {}};
+  SceneView view{t_s, T_map_cam, T_map_cam.rotation(), prepared.channels.factors(t_s), {}, {}, {}};
   for (const MovingPart& part : prepared.scene.moving) {
     view.T_map_part.push_back(part.T_map_part(t_s));
     view.T_part_cam.push_back(view.T_map_part.back().inverse() * T_map_cam);
   }
+  for (const Pane& pane : prepared.scene.panes)
+    if (const auto seen = make_pane_view(pane, T_map_cam)) view.panes.push_back(*seen);
   return view;
 }
 
@@ -86,6 +90,8 @@ SceneView interpolate_view(const SceneView& a, const SceneView& b, double fracti
     view.T_map_part.push_back(interpolate(a.T_map_part[i], b.T_map_part[i], fraction));
     view.T_part_cam.push_back(view.T_map_part.back().inverse() * view.T_map_cam);
   }
+  for (const PaneView& pane : a.panes)
+    if (const auto seen = make_pane_view(*pane.pane, view.T_map_cam)) view.panes.push_back(*seen);
   return view;
 }
 
@@ -121,9 +127,7 @@ namespace {
 template <class V>
 V matt_luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
                  const RayAreas<V>& r) {
-  const auto along = [&r](const Eigen::Vector3f& axis) {
-    return V(axis.x() * r.x + axis.y() * r.y + axis.z());
-  };
+  const auto along = [&r](const Eigen::Vector3f& axis) { return sim::along(axis, r.x, r.y); };
   const V inverse = 1.0F / along(patch.normal), depth = patch.reach * inverse;
   const Material& material = prepared.scene.materials[patch.patch->material];
   V reflectance = all<V>(static_cast<float>(material.reflectance));
@@ -150,47 +154,105 @@ V matt_luminance(const PreparedScene& prepared, const SceneView& view, const Pat
   return reflectance * lux * std::numbers::inv_pi_v<float> + emission;
 }
 
-// What the coat of a static patch mirrors: the scene as seen from behind the mirror, along the same ray.
-float mirrored_luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& mirror,
-                         const RayAreas<float>& r) {
+float lane(float v, int) { return v; }
+float lane(const FloatLanes& v, int i) { return v[i]; }
+void set_lane(float& v, int, float value) { v = value; }
+void set_lane(FloatLanes& v, int i, float value) { v[i] = value; }
+bool is_set(bool mask, int) { return mask; }
+bool is_set(const IntLanes& mask, int i) { return mask[i] != 0; }
+template <class V>
+constexpr int lanes() {
+  return std::is_same_v<V, float> ? 1 : kLanes;
+}
+
+// What a plane mirrors where it is wanted: the scene as seen from behind the mirror, along the same rays.
+template <class V>
+V mirrored_luminance(const PreparedScene& prepared, const SceneView& view, const MirrorPlane& mirror,
+                     const RayAreas<V>& r, const typename LaneTypes<V>::Mask& wanted) {
   constexpr float kSkipped_m = 2e-3F;  // prints on the mirror do not mirror themselves
-  const Eigen::Vector3d& n = mirror.patch->normal;
-  const Eigen::Vector3d origin = view.T_map_cam.p - 2 * (n.dot(view.T_map_cam.p) + mirror.patch->offset) * n;
+  const Eigen::Vector3d& n = mirror.normal;
+  const Eigen::Vector3d origin = view.T_map_cam.p - 2 * (n.dot(view.T_map_cam.p) + mirror.offset) * n;
   const Eigen::Matrix3d R = view.R_map_cam - 2 * n * (n.transpose() * view.R_map_cam);
-  float sum = 0;
+  V sum{};
   for (const auto& [a, b] : {std::pair{-0.25F, -0.25F}, {0.25F, -0.25F}, {-0.25F, 0.25F}, {0.25F, 0.25F}}) {
-    const RayAreas<float> quarter{r.x + a * r.column_x + b * r.row_x,
-                                  r.y + a * r.column_y + b * r.row_y,
-                                  0.5F * r.column_x,
-                                  0.5F * r.column_y,
-                                  0.5F * r.row_x,
-                                  0.5F * r.row_y};
-    const Eigen::Vector3f ray(quarter.x, quarter.y, 1);
-    const float depth = std::max(0.0F, mirror.reach / mirror.normal.dot(ray));
-    const auto hit = prepared.rays.trace(origin, R * ray.cast<double>(), depth + kSkipped_m);
-    sum +=
-        hit ? matt_luminance(prepared, view, make_patch_view(origin, R, prepared.patch_of(*hit), -1), quarter)
-            : static_cast<float>(prepared.scene.sky_cd_m2);
+    const RayAreas<V> quarter{r.x + a * r.column_x + b * r.row_x,
+                              r.y + a * r.column_y + b * r.row_y,
+                              0.5F * r.column_x,
+                              0.5F * r.column_y,
+                              0.5F * r.row_x,
+                              0.5F * r.row_y};
+    std::array<const Patch*, kLanes> met{};
+    for (int i = 0; i < lanes<V>(); ++i) {
+      if (!is_set(wanted, i)) continue;
+      const Eigen::Vector3f ray(lane(quarter.x, i), lane(quarter.y, i), 1);
+      const float depth = std::max(0.0F, mirror.reach / mirror.in_camera.dot(ray));
+      const auto hit = prepared.rays.trace(origin, R * ray.cast<double>(), depth + kSkipped_m);
+      if (hit) met[i] = &prepared.patch_of(*hit);
+    }
+    V seen = all<V>(static_cast<float>(prepared.scene.sky_cd_m2));
+    for (int i = 0; i < lanes<V>(); ++i) {
+      const Patch* const patch = met[i];
+      if (patch == nullptr) continue;
+      const V own = matt_luminance(prepared, view, make_patch_view(origin, R, *patch, -1), quarter);
+      for (int k = i; k < lanes<V>(); ++k) {
+        if (met[k] != patch) continue;
+        set_lane(seen, k, lane(own, k));
+        met[k] = nullptr;
+      }
+    }
+    sum = sum + seen;
   }
   return 0.25F * sum;
 }
 
 // Adds what a clear coat mirrors, by Schlick's law of the angle (1994).
-float coated(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
-             const RayAreas<float>& r, float matt) {
+template <class V>
+V coated(const PreparedScene& prepared, const SceneView& view, const PatchView& patch, const RayAreas<V>& r,
+         const V& matt) {
   const auto normal = static_cast<float>(prepared.scene.materials[patch.patch->material].mirror);
-  const Eigen::Vector3f ray(r.x, r.y, 1);
-  const float rest = 1 - std::min(1.0F, std::abs(patch.normal.dot(ray)) / ray.norm()), square = rest * rest;
-  const float mirrored = normal + (1 - normal) * square * square * rest;
-  return (1 - mirrored) * matt + mirrored * mirrored_luminance(prepared, view, patch, r);
+  V mirrored{};
+  for (int i = 0; i < lanes<V>(); ++i) {
+    const Eigen::Vector3f ray(lane(r.x, i), lane(r.y, i), 1);
+    const float rest = 1 - std::min(1.0F, std::abs(patch.normal.dot(ray)) / ray.norm()), square = rest * rest;
+    set_lane(mirrored, i, normal + (1 - normal) * square * square * rest);
+  }
+  const MirrorPlane mirror{patch.patch->normal, patch.patch->offset, patch.normal, patch.reach};
+  const auto everywhere = V{} == V{};
+  return (1 - mirrored) * matt + mirrored * mirrored_luminance(prepared, view, mirror, r, everywhere);
 }
-FloatLanes coated(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
-                  const RayAreas<FloatLanes>& r, FloatLanes matt) {
-  for (int i = 0; i < kLanes; ++i)
-    matt[i] = coated(prepared, view, patch,
-                     RayAreas<float>{r.x[i], r.y[i], r.column_x[i], r.column_y[i], r.row_x[i], r.row_y[i]},
-                     matt[i]);
-  return matt;
+
+// `behind` as seen through the panes that are nearer than the nearness `beyond`, 1 / m, the farthest first.
+template <class V>
+V through_panes(const PreparedScene& prepared, const SceneView& view, const RayAreas<V>& r, V beyond,
+                V behind) {
+  using Int = typename LaneTypes<V>::Int;
+  for (;;) {
+    V nearness = all<V>(std::numeric_limits<float>::infinity());
+    Int farthest = Int{} - 1;
+    for (std::size_t k = 0; k < view.panes.size(); ++k) {
+      const V own = along(view.panes[k].nearness, r.x, r.y);
+      const auto farther = (own < nearness) & meets(view.panes[k], r.x, r.y, beyond);
+      nearness = select(farther, own, nearness);
+      farthest = select(farther, Int{} + static_cast<std::int32_t>(k), farthest);
+    }
+    if (!any(farthest >= 0)) return behind;
+    for (std::size_t k = 0; k < view.panes.size(); ++k) {
+      const typename LaneTypes<V>::Mask here = farthest == static_cast<std::int32_t>(k);
+      if (!any(here)) continue;
+      const MirrorPlane& mirror = view.panes[k].mirror;
+      V mirrored{}, through{};
+      for (int i = 0; i < lanes<V>(); ++i) {
+        const Eigen::Vector3d ray(lane(r.x, i), lane(r.y, i), 1);
+        const double cosine = std::abs(mirror.in_camera.cast<double>().dot(ray)) / ray.norm();
+        const PlateLight plate = plate_light(std::min(1.0, cosine), kGlassIndex);
+        set_lane(mirrored, i, static_cast<float>(plate.mirrored));
+        set_lane(through, i, static_cast<float>(plate.through));
+      }
+      const V light = through * behind + mirrored * mirrored_luminance(prepared, view, mirror, r, here);
+      behind = select(here, light, behind);
+    }
+    beyond = select(farthest >= 0, nearness, beyond);
+  }
 }
 
 }  // namespace
@@ -198,10 +260,20 @@ FloatLanes coated(const PreparedScene& prepared, const SceneView& view, const Pa
 template <class V>
 V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
             const RayAreas<V>& areas) {
-  const V matt = matt_luminance(prepared, view, patch, areas);
-  if (!(prepared.scene.materials[patch.patch->material].mirror > 0) || patch.part >= 0) return matt;
-  return coated(prepared, view, patch, areas, matt);
+  V out = matt_luminance(prepared, view, patch, areas);
+  if (prepared.scene.materials[patch.patch->material].mirror > 0 && patch.part < 0)
+    out = coated(prepared, view, patch, areas, out);
+  if (view.panes.empty()) return out;
+  return through_panes(prepared, view, areas, V(along(patch.normal, areas.x, areas.y) / patch.reach), out);
 }
+
+template <class V>
+V sky_luminance(const PreparedScene& prepared, const SceneView& view, const RayAreas<V>& areas) {
+  const V sky = all<V>(static_cast<float>(prepared.scene.sky_cd_m2));
+  return view.panes.empty() ? sky : through_panes(prepared, view, areas, all<V>(0), sky);
+}
+template float sky_luminance(const PreparedScene&, const SceneView&, const RayAreas<float>&);
+template FloatLanes sky_luminance(const PreparedScene&, const SceneView&, const RayAreas<FloatLanes>&);
 
 template float luminance(const PreparedScene&, const SceneView&, const PatchView&, const RayAreas<float>&);
 template FloatLanes luminance(const PreparedScene&, const SceneView&, const PatchView&,

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "evpose/sim/light/panes.h"
 #include "evpose/sim/light/pixel_rays.h"
 #include "evpose/sim/light/prepared_scene.h"
 #include "evpose/sim/world/lanes.h"
@@ -18,6 +19,7 @@ struct SceneView {
   std::vector<float> light;      ///< factor of each light channel
   std::vector<Pose> T_part_cam;  ///< of each moving part
   std::vector<Pose> T_map_part;
+  std::vector<PaneView> panes;
 };
 SceneView make_scene_view(const PreparedScene& prepared, double t_s, const Pose& T_map_cam);
 /// Interpolates two views that are less than a pixel apart; fraction 0 is `a`.
@@ -42,10 +44,15 @@ template <class V>
 struct RayAreas {
   V x, y, column_x, column_y, row_x, row_y;
 };
-/// Mean luminance over each area, cd/m^2. A clear coat mirrors what stands still.
+/// Mean luminance over each area, cd/m^2, as seen through the panes before the patch. A clear coat and a pane
+/// mirror what stands still, without panes and coats; whether a pane is met is decided in the middle of an
+/// area.
 template <class V>
 V luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
             const RayAreas<V>& areas);
+/// The same where no surface is met.
+template <class V>
+V sky_luminance(const PreparedScene& prepared, const SceneView& view, const RayAreas<V>& areas);
 /// Mean luminance over the area of the pixel of `ray`, around its point (x, y), cd/m^2.
 float luminance(const PreparedScene& prepared, const SceneView& view, const PatchView& patch,
                 const PixelRay& ray, float x = 0, float y = 0);

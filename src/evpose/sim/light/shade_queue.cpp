@@ -35,18 +35,15 @@ std::int32_t ShadeQueue::number_of(int part, std::int32_t patch) {
 }
 
 void ShadeQueue::shade_all(std::int32_t number, const float* x, const float* y, float* out) const {
-  if (number == kSky) {
-    std::fill_n(out, kTilePixels, static_cast<float>(prepared_->scene.sky_cd_m2));
-    return;
-  }
   for (int i = 0; i < kTilePixels; i += kLanes) {
     const RayAreas<FloatLanes> areas{load(x + i),         load(y + i),      load(&column_x_[i]),
                                      load(&column_y_[i]), load(&row_x_[i]), load(&row_y_[i])};
-    store(out + i, sim::luminance(*prepared_, *view_, patches_[number], areas));
+    store(out + i, number == kSky ? sky_luminance(*prepared_, *view_, areas)
+                                  : sim::luminance(*prepared_, *view_, patches_[number], areas));
   }
 }
 
-FloatLanes ShadeQueue::shade_lanes(const PatchView& patch, const std::uint32_t* places) const {
+FloatLanes ShadeQueue::shade_lanes(const PatchView* patch, const std::uint32_t* places) const {
   RayAreas<FloatLanes> areas;
   IntLanes pixel;
   for (int i = 0; i < kLanes; ++i) {
@@ -59,7 +56,8 @@ FloatLanes ShadeQueue::shade_lanes(const PatchView& patch, const std::uint32_t* 
   areas.column_y = gather(column_y_.data(), pixel);
   areas.row_x = gather(row_x_.data(), pixel);
   areas.row_y = gather(row_y_.data(), pixel);
-  return sim::luminance(*prepared_, *view_, patch, areas);
+  return patch == nullptr ? sky_luminance(*prepared_, *view_, areas)
+                          : sim::luminance(*prepared_, *view_, *patch, areas);
 }
 
 void ShadeQueue::shade() {
@@ -76,17 +74,17 @@ void ShadeQueue::shade() {
     order_[first_[kind(places_[i])]++] = static_cast<std::uint32_t>(i);
   answers_.resize(places_.size());
   std::size_t at = 0;  // `first_` of a kind is now the end of it
-  for (std::size_t k = 0; k + 1 < kinds; ++k) {
+  for (std::size_t k = 0; k < kinds; ++k) {
+    const PatchView* patch = k + 1 < kinds ? &patches_[k] : nullptr;
     for (; at < first_[k]; at += kLanes) {
       const std::size_t n = std::min<std::size_t>(kLanes, first_[k] - at);
       std::array<std::uint32_t, kLanes> places;
       for (std::size_t i = 0; i < kLanes; ++i) places[i] = order_[at + std::min(i, n - 1)];
-      const FloatLanes light = shade_lanes(patches_[k], places.data());
+      const FloatLanes light = shade_lanes(patch, places.data());
       for (std::size_t i = 0; i < n; ++i) answers_[places[i]] = light[i];
     }
     at = first_[k];
   }
-  for (; at < order_.size(); ++at) answers_[order_[at]] = static_cast<float>(prepared_->scene.sky_cd_m2);
 }
 
 }  // namespace evpose::sim

@@ -30,14 +30,15 @@ class ShadeQueue {
   float luminance(std::size_t answer) const { return answers_[answer]; }
 
   /// All pixels of the tile show one patch.
-  void shade_all(std::int32_t number, const float* x, const float* y, float* luminance) const;
+  void shade_all(std::int32_t number, const float* x, const float* y, float* out) const;
 
  private:
   struct Place {
     std::int32_t number, pixel;
     float x, y;
   };
-  FloatLanes shade_lanes(const PatchView& patch, const std::uint32_t* places) const;
+  /// `patch` nullptr: the sky.
+  FloatLanes shade_lanes(const PatchView* patch, const std::uint32_t* places) const;
 
   const PreparedScene* prepared_ = nullptr;
   const SceneView* view_ = nullptr;

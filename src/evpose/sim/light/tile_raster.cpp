@@ -12,10 +12,6 @@ constexpr float kMargin_px = 0.05F;
 /// Of depths that count as different.
 constexpr float kRounding = 1 - 1e-4F;
 
-FloatLanes along(const Eigen::Vector3f& function, FloatLanes x, FloatLanes y) {
-  return function.x() * x + function.y() * y + function.z();
-}
-
 // Where the triangle is nearer than `nearness`.
 IntLanes in_front(const TriangleShape& shape, FloatLanes x, FloatLanes y, FloatLanes nearness,
                   FloatLanes& own) {

@@ -115,8 +115,9 @@ void expect_mean_of_rays(double blur_px) {
         const std::size_t i = static_cast<std::size_t>(y) * kTilePx + x;
         double wanted = 0;
         for (int n = 0; n < kSide * kSide; ++n) {
-          const float dx = (static_cast<float>(n % kSide) + 0.5F) / kSide - 0.5F,
-                      dy = (static_cast<float>(n / kSide) + 0.5F) / kSide - 0.5F;
+          const int column = n % kSide, row = n / kSide;
+          const float dx = (static_cast<float>(column) + 0.5F) / kSide - 0.5F,
+                      dy = (static_cast<float>(row) + 0.5F) / kSide - 0.5F;
           const PixelRay& ray = sampler.ray(i);
           const auto hit =
               place.prepared.rays.trace(at.T_map_cam.p, at.R_map_cam * ray.direction(dx, dy).cast<double>());
@@ -191,7 +192,8 @@ TEST(TileSampler, StepResponseHasTheVarianceOfThePixelAndTheBlur) {
   }
 }
 
-// Eight directions at once have the luminance of each, with texture and two channels of light.
+// Eight directions at once have the luminance of each, with texture, two channels of light, a coat and a
+// pane.
 TEST(SceneView, LuminanceOfEightIsThatOfEach) {
   TestScene plain;
   plain.add({2, -1, -1}, {0, 0, 2}, {0, 2, 0}, 0.8);
@@ -204,6 +206,10 @@ TEST(SceneView, LuminanceOfEightIsThatOfEach) {
   lamp.switching.flicker_hz = 100;
   lamp.switching.flicker_depth = 0.3;
   plain.scene.lights.push_back(lamp);
+  // A coat, a pane before a part of it, and behind the camera what they mirror.
+  plain.scene.materials.back().mirror = 0.04;
+  plain.scene.panes = {{{1.2, -0.2, -1}, {0, 0.6, 0}, {0, 0, 2}}};
+  for (int i = 0; i < 9; ++i) plain.add({-1, 0.4 * i - 2, -2}, {0, 0.4, 0}, {0, 0, 4}, 0.1 * i);
   ThreadPool pool(1);
   const PreparedScene prepared(plain.scene, pool);
   ASSERT_EQ(prepared.channels.switching.size(), 2U);

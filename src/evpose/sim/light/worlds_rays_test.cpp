@@ -92,5 +92,38 @@ TEST(WorldsRays, OnlyFrontsAreSeen) {
   }
 }
 
+// The rim of every pane of the hall is in its frame: nobody sees it from where cameras fly. Nothing but bars
+// cuts through a pane: within it, a line of sight is free from frame to frame.
+TEST(WorldsRays, PanesFillTheirFrames) {
+  for (const int seed : {1, 2, 3, 4}) {
+    WorldConfig config;
+    config.seed = seed;
+    config.glass_wall = true;
+    WorldBuilder builder(config);
+    ASSERT_TRUE(build_world(builder).ok());
+    const Scene& scene = builder.scene;
+    const RayCaster rays(scene);
+    Random random(9);
+    ASSERT_EQ(scene.panes.size(), 3U);
+    for (std::size_t k = 0; k < scene.panes.size(); ++k) {
+      const Pane& pane = scene.panes[k];
+      for (int i = 0; i < 1000; ++i) {
+        const double part = random.uniform(0, 1), end = i % 2;
+        const V rim =
+            pane.corner + (i % 4 < 2 ? V(part * pane.u + end * pane.v) : V(end * pane.u + part * pane.v));
+        V eye;
+        for (int j = 0; j < 3; ++j) eye[j] = random.uniform(scene.low[j], scene.high[j]);
+        ASSERT_TRUE(rays.occluded(eye, rim - eye, 0, 0.9999F)) << rim.transpose();
+      }
+      if (k == 2) continue;  // the window has bars
+      for (double part = 0.02; part < 0.98; part += 0.01) {
+        const V across = pane.corner + part * pane.v, up = pane.corner + part * pane.u;
+        ASSERT_FALSE(rays.occluded(across, pane.u, 0.02F, 0.98F)) << across.transpose();
+        ASSERT_FALSE(rays.occluded(up, pane.v, 0.02F, 0.98F)) << up.transpose();
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace evpose::sim

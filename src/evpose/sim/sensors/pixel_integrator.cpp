@@ -113,9 +113,9 @@ struct PixelIntegrator::Impl {
   void make_views(Block& block) const;
   void set_tile_speeds(TimeNs t0, TimeNs t1, const std::vector<float>& nearest_before);
   float glare() const;
-  TilePlan plan_tile(std::size_t tile, const Block& block, int& samples) const;
+  TilePlan plan_tile(std::size_t k, const Block& block, int& samples) const;
   void sample_first(const SceneView& view, const Block& block);
-  void integrate_tile(std::size_t tile, TileSampler& sampler, const Block& block);
+  void integrate_tile(std::size_t k, TileSampler& sampler, const Block& block);
   void collect(TimeNs t0, std::vector<SimEvent>& events);
 };
 
@@ -136,14 +136,18 @@ void PixelIntegrator::Impl::prepare_tiles() {
   }
 }
 
-// The nearest surface of each tile.
+// The nearest surface or pane of each tile.
 void PixelIntegrator::Impl::measure_depths(const SceneView& view) {
   pool.for_chunks(tiles.size(), 8, [&](std::size_t, std::size_t begin, std::size_t end) {
     TileRaster raster;
     for (std::size_t k = begin; k < end; ++k) {
       raster.set_tile(rays, size, tiles[k].tile);
       raster.draw(prepared, view, triangles.of_tile(k));
-      tiles[k].nearest = std::max(1 / raster.largest_nearness(), static_cast<float>(kNearest_m));
+      // What a pane mirrors seems to lie beyond it.
+      float nearness = raster.largest_nearness();
+      for (const PaneView& pane : view.panes)
+        nearness = std::max(nearness, static_cast<float>(largest_nearness(pane, tiles[k].probe)));
+      tiles[k].nearest = std::max(1 / nearness, static_cast<float>(kNearest_m));
     }
   });
 }

@@ -244,6 +244,32 @@ void add_floor_things(WorldBuilder& d, const Hall& h) {
                 d.random.uniform(0.3, 0.5), 0.72);
 }
 
+// A glass wall across the room between the flight and the tables: two panes in a frame. And a pane in the
+// window, in the middle of its bars.
+void add_glass(WorldBuilder& d, const Hall& h) {
+  if (!d.config.glass_wall) return;
+  constexpr double kX = 5.72, kLow = 1.35, kHigh = 4.65, kTop = 2.3, kDeep = 0.06, kBar = 0.07, kRail = 0.12;
+  constexpr double kInFrame = 0.01;  // how deep the rim of a pane is in the frame
+  Mesh& mesh = d.scene.mesh;
+  const Finish frame{h.furniture.white, d.add_object("glass wall"), {0, 0}};
+  const double middle = 0.5 * (kLow + kHigh), half = 0.5 * kBar, back = kX - 0.5 * kDeep,
+               front = back + kDeep;
+  for (const double y : {kLow, middle, kHigh})
+    add_box_between(mesh, V(back, y - half, 0), V(front, y + half, kTop), frame, kOnFloor);
+  for (const double y : {kLow, middle}) {
+    const double from = y + half, to = y + middle - kLow - half;
+    add_box_between(mesh, V(back, from, 0), V(front, to, kRail), frame, side_west | side_east | side_above);
+    add_box_between(mesh, V(back, from, kTop - kBar), V(front, to, kTop), frame,
+                    side_west | side_east | side_below | side_above);
+    const V low(kX, from - kInFrame, kRail - kInFrame);
+    d.scene.panes.push_back(
+        {low, V(0, to - from + 2 * kInFrame, 0), V(0, 0, kTop - kBar - kRail + 2 * kInFrame)});
+  }
+  d.scene.panes.push_back({V(kLength + 0.125, kWindow.u0 - kInFrame, kWindow.v0 - kInFrame),
+                           V(0, kWindow.u1 - kWindow.u0 + 2 * kInFrame, 0),
+                           V(0, 0, kWindow.v1 - kWindow.v0 + 2 * kInFrame)});
+}
+
 void add_moving_things(WorldBuilder& d) {
   const MoversConfig& c = d.config.movers;
   if (c.fans + c.people == 0) return;
@@ -274,18 +300,19 @@ void add_moving_things(WorldBuilder& d) {
 
 }  // namespace
 
-void build_hall(WorldBuilder& d) {
-  d.scene.name = "hall";
-  d.scene.low = {1.2, 1.2, 0.85};
-  d.scene.high = {5.2, 4.8, 2.4};
-  const Hall hall = add_materials(d);
-  add_shell(d, hall);
-  add_window(d, hall);
-  add_lights(d, hall);
-  add_pillars(d, hall);
-  furnish(d, hall);
-  add_floor_things(d, hall);
-  add_moving_things(d);
+void build_hall(WorldBuilder& builder) {
+  builder.scene.name = "hall";
+  builder.scene.low = {1.2, 1.2, 0.85};
+  builder.scene.high = {5.2, 4.8, 2.4};
+  const Hall hall = add_materials(builder);
+  add_shell(builder, hall);
+  add_window(builder, hall);
+  add_lights(builder, hall);
+  add_pillars(builder, hall);
+  furnish(builder, hall);
+  add_floor_things(builder, hall);
+  add_moving_things(builder);
+  add_glass(builder, hall);
 }
 
 }  // namespace evpose::sim

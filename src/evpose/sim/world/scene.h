@@ -74,6 +74,12 @@ struct MovingPart {
   std::function<Pose(double t_s)> T_map_part;  ///< smooth; called from several threads
 };
 
+/// A flat rectangle of clear glass that is seen through and mirrors. It is no part of a mesh: light, the
+/// LiDAR and contours pass it. Its rim should be in a frame.
+struct Pane {
+  Eigen::Vector3d corner, u, v;  ///< from `corner` along `u` and `v`, at right angles; metres, map frame
+};
+
 /// The environment of the sensors. Map frame: z up, metres.
 struct Scene {
   std::string name;
@@ -81,6 +87,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Light> lights;
   std::vector<MovingPart> moving;
+  std::vector<Pane> panes;
   std::vector<std::string> objects;     ///< names by Mesh::object; every moving object has its own number
   std::vector<std::int32_t> furniture;  ///< numbers of the static objects that people move about
   double sky_cd_m2 = 0;                 ///< luminance where a ray hits nothing

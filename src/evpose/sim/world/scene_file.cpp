@@ -45,7 +45,8 @@ class SceneReader {
     const std::pair<const char*, Reader> parts[] = {{"lights", &SceneReader::read_light},
                                                     {"materials", &SceneReader::read_material},
                                                     {"objects", &SceneReader::read_object},
-                                                    {"moving", &SceneReader::read_moving}};
+                                                    {"moving", &SceneReader::read_moving},
+                                                    {"panes", &SceneReader::read_pane}};
     for (const auto& [key, reader] : parts) {
       const YamlNode* const list = top.member(key);
       if (list == nullptr) continue;
@@ -275,6 +276,17 @@ class SceneReader {
     if (auto status = f.finish(); !status) return status;
     if (!body) return body.error();
     add_mesh(builder_.scene.mesh, *body, T_map_body);
+    return {};
+  }
+
+  Status read_pane(const YamlNode& node) {
+    SceneFields f(document_, node, "pane");
+    const Pane pane{f.needed_vector("corner"), f.needed_vector("u"), f.needed_vector("v")};
+    const double area = pane.u.norm() * pane.v.norm();
+    if (area < 1e-6 || std::abs(pane.u.dot(pane.v)) > 1e-3 * area)
+      f.fail(node, "pane: u and v are not the sides of a rectangle", "give two directions at right angles");
+    if (auto status = f.finish(); !status) return status;
+    builder_.scene.panes.push_back(pane);
     return {};
   }
 

@@ -133,6 +133,24 @@ TEST(SceneFile, ReadsMeshesInBothFormats) {
   EXPECT_LT((pyramid.max() - Eigen::Vector3f(1, 1, 6)).norm(), 1e-5F);
 }
 
+TEST(SceneFile, PanesAreReadAndAreNoPartOfTheMesh) {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& v) {
+    return read(folder,
+                std::string(kSmall) + "panes:\n  - {corner: [1, 2, 0], u: [3, 0, 0], v: " + v + "}\n");
+  };
+  const auto scene = with("[0, 0, 2]");
+  ASSERT_TRUE(scene.ok()) << error_line(scene);
+  EXPECT_EQ(scene->mesh.triangles.size(), 14u);
+  ASSERT_EQ(scene->panes.size(), 1u);
+  EXPECT_EQ(scene->panes[0].corner, Eigen::Vector3d(1, 2, 0));
+  EXPECT_EQ(scene->panes[0].v, Eigen::Vector3d(0, 0, 2));
+  const std::string told =
+      ":13: pane: u and v are not the sides of a rectangle; give two directions at right angles";
+  for (const char* v : {"[0, 0, 0]", "[1, 0, 2]", "[0, 0, 1e-9]"})
+    EXPECT_EQ(error_line(with(v)), folder / "scene.yaml" + told) << v;
+}
+
 TEST(SceneFile, ThePublishedExampleIsRead) {
   ThreadPool pool(2);
   const auto scene = read_scene(std::string(EVPOSE_SOURCE_DIR) + "/scenarios/scenes/workshop.yaml", {}, pool);

@@ -29,6 +29,8 @@ void describe(ConfigTable& table, WorldConfig& c) {
       "mirror", c.mirror, "",
       "reflectance of the hall's floor, outside of window panes, at normal incidence; 0: matt, glass: 0.04",
       {0, 1});
+  table.add("glass_wall", c.glass_wall,
+            "hall: a framed glass wall before the tables, and a pane in the window");
   table.add("pad_mark", c.pad_mark, pad_marks(), "courtyard: on the landing platform");
   table.group("movers", c.movers);
 }
@@ -37,6 +39,11 @@ Status build_world(WorldBuilder& builder) {
   if (builder.config.kind == WorldKind::hall && builder.config.movers.cars > 0)
     return Error{"movers.cars", "the hall has no room for cars",
                  "take the courtyard or the canyon, or 0 cars"};
+  if (builder.config.glass_wall && builder.config.kind != WorldKind::hall)
+    return Error{"glass_wall", "only the hall has a glass wall", "take the hall, or glass_wall: false"};
+  if (builder.config.glass_wall && builder.config.movers.people > 0)
+    return Error{"movers.people", "the glass wall stands where people walk",
+                 "take 0 people, or no glass wall"};
   builder.random = Random(static_cast<std::uint64_t>(builder.config.seed), 0x576F726C64);
   switch (builder.config.kind) {
     case WorldKind::hall:

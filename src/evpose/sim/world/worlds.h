@@ -35,6 +35,7 @@ struct WorldConfig {
   bool night = false;                ///< no sun, hardly a sky, street lamps on
   bool repeated_facades = false;     ///< outside: facades whose windows are all alike
   PadMark pad_mark = PadMark::none;  ///< courtyard: on the landing platform
+  bool glass_wall = false;           ///< hall: a glass wall before the tables, a pane in the window
   double mirror = 0;                 ///< Material::mirror of the floor in the hall, of window panes outside
   MoversConfig movers;
 };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -130,6 +131,26 @@ TEST(Worlds, RefuseCarsInTheHall) {
   ASSERT_FALSE(scene.ok());
   EXPECT_EQ(scene.error().line(),
             "movers.cars: the hall has no room for cars; take the courtyard or the canyon, or 0 cars");
+}
+
+TEST(Worlds, AGlassWallLeavesEverythingElseAsItIs) {
+  WorldConfig config;
+  WorldBuilder without(config);
+  ASSERT_TRUE(build_world(without).ok());
+  config.glass_wall = true;
+  WorldBuilder with(config);
+  ASSERT_TRUE(build_world(with).ok());
+  const auto& plain = without.scene.mesh.vertices;
+  const auto& glazed = with.scene.mesh.vertices;
+  ASSERT_GT(glazed.size(), plain.size());
+  EXPECT_TRUE(std::equal(plain.begin(), plain.end(), glazed.begin()));
+  EXPECT_TRUE(without.scene.panes.empty());
+  EXPECT_EQ(with.scene.panes.size(), 3U);
+  config.movers.people = 1;
+  EXPECT_FALSE(build_world(with).ok());
+  config.movers.people = 0;
+  config.kind = WorldKind::canyon;
+  EXPECT_FALSE(build_world(with).ok());
 }
 
 TEST(Worlds, NightIsMillionsOfTimesDarkerThanDay) {

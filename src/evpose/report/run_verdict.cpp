@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <utility>
 
 namespace evpose {
 namespace {
@@ -18,6 +19,7 @@ struct Explanation {
   const char* cause;
   const char* remedy;
 };
+constexpr const char* kSearch = "searching for the pose";  // follows from something else, mostly
 constexpr std::array kExplanations{
     Explanation{"do not gather", "wrong map, start or calibration: contours are not where the events are",
                 "look at the report's pictures: contours must lie on events; `evpose check` the recording"},
@@ -30,9 +32,8 @@ constexpr std::array kExplanations{
                 "look at the report's pictures: contours must lie on events; `evpose check` the recording"},
     Explanation{"contradicts the prediction", "the IMU and the contours tell different motions",
                 "check axes, units and clock of the IMU with `evpose check`"},
-    Explanation{"searching for the pose",
-                "the start is further off than was said, or map and recording do not belong together",
-                "give a nearer --init, or its true error with --init-sigma"},
+    Explanation{kSearch, "the pose was lost and is not found, or the start is further off than was said",
+                "mend what else is named; else give a nearer --init, or its true error with --init-sigma"},
     Explanation{"IMU saturated", "the motion exceeds the range of the IMU",
                 "set a wider range in the sensor, and imu.gyro_range_rad_s and imu.accel_range_m_s2"},
     Explanation{"IMU gap", "samples of the IMU were lost", "record with less load; `evpose info` lists gaps"},
@@ -115,8 +116,10 @@ RunVerdict judge_run(const StateLog& log) {
     known->total_s += lasted_s;
     known->last = change.t;
   }
-  std::stable_sort(out.problems.begin(), out.problems.end(),
-                   [](const RunProblem& a, const RunProblem& b) { return a.total_s > b.total_s; });
+  const auto follows = [](const RunProblem& p) { return p.reason.find(kSearch) != std::string::npos; };
+  std::stable_sort(out.problems.begin(), out.problems.end(), [&](const RunProblem& a, const RunProblem& b) {
+    return std::pair(follows(a), -a.total_s) < std::pair(follows(b), -b.total_s);
+  });
   return out;
 }
 

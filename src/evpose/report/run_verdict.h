@@ -27,7 +27,7 @@ struct RunVerdict {
   /// updates.
   double tracking_share = 0;
   double length_s = 0;               ///< of data
-  std::vector<RunProblem> problems;  ///< the longest first; one for each cause
+  std::vector<RunProblem> problems;  ///< one for each cause, the longest first; a search last
   bool good() const { return tracking_share >= kGoodTrackingShare; }
 };
 

@@ -65,6 +65,14 @@ TEST(RunVerdict, ProblemsAreOneForEachCauseTheLongestFirst) {
   EXPECT_NEAR(v.length_s, 7.29, 1e-9);
 }
 
+TEST(RunVerdict, ASearchComesAfterWhatItFollowsFrom) {
+  const RunVerdict v = judge_run(log_of({{1, Health::tracking, "a"},
+                                         {0.5, Health::degraded, "events do not gather at the contours"},
+                                         {3, Health::lost, "searching for the pose"}}));
+  ASSERT_EQ(v.problems.size(), 2u);
+  EXPECT_EQ(v.problems[1].reason, "searching for the pose");
+}
+
 TEST(RunVerdict, EveryReasonOfTheTrackerHasACauseOfItsOwnAndARemedy) {
   std::set<std::string> causes;
   const std::vector<std::string> reasons{

@@ -24,11 +24,11 @@ constexpr double kExplainedShare = 0.55;    // of the spread, left by other axes
 constexpr double kFastInDegrees_rad_s = 3;  // root mean square of rates that may be degrees
 constexpr double kDegreesShare = 1.0 / 3;   // of the spread, left by the other unit
 // Against a reference.
-constexpr double kTurnWindow_s = 0.25;
-constexpr double kLeastTurn_rad = 0.02;  // root mean square turn over a window
-constexpr double kWrongShare = 0.4;      // of the turns, unexplained as read,
-constexpr double kRightShare = 0.35;     // and with other axes,
-constexpr double kRighter = 0.5;         // which must explain so much more
+constexpr double kTurnWindow_s = 0.1;
+constexpr double kLeastTurn_rad = 0.004;  // root mean square turn over a window
+constexpr double kWrongShare = 0.1;       // of the turns, unexplained as read: beyond bias and noise,
+constexpr double kRightShare = 0.35;      // and with other axes,
+constexpr double kRighter = 0.4;          // which must leave so little of what was unexplained
 constexpr double kWrongForce_m_s2 = 4, kRightForce_m_s2 = 2;
 
 std::vector<AxisNames> all_axis_names() {

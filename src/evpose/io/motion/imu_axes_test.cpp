@@ -83,6 +83,18 @@ TEST(ImuAxes, AnyOtherNamingOfTheGyroscopesAxesIsFound) {
   EXPECT_GE(told_by_gravity, 40);
 }
 
+TEST(ImuAxes, GentleTurnsAreEnoughBesideAGroundTruth) {
+  const Flight flight = turning_flight(0.1);  // 6 deg/s on the whole
+  AxisNames names;
+  names << 0, 1, 0, 1, 0, 0, 0, 0, 1;
+  EXPECT_TRUE(doubt_axes_against(flight.truth, flight.imu, "imu.csv").empty());
+  auto read = flight.imu;
+  for (ImuSample& s : read) s.gyro = names.transpose() * s.gyro;
+  const auto doubts = doubt_axes_against(flight.truth, read, "imu.csv");
+  ASSERT_EQ(doubts.size(), 1u);
+  EXPECT_TRUE(says(doubts[0].line(), {"gyroscope", in_words(names).c_str()})) << doubts[0].line();
+}
+
 TEST(ImuAxes, AnyOtherNamingOfTheAccelerometersAxesIsFoundByTheGroundTruth) {
   const Flight flight = turning_flight();
   for (const AxisNames& names : every_axis_names()) {

@@ -129,7 +129,8 @@ class EventPixels {
     const V next = log_next - behind_next;
     // The filtered signal turns where it meets the log luminance.
     const auto turns = (behind < 0.0F) != (behind_next < 0.0F);
-    const auto reaches = (larger(p.log_last, log_next) >= p.high) | (smaller(p.log_last, log_next) <= p.low);
+    const auto above = larger(p.log_last, log_next) >= p.high, below = smaller(p.log_last, log_next) <= p.low;
+    const auto reaches = above | below;
     // Log luminance as linear and one time constant are good enough over small changes only.
     const auto quiet = (magnitude(change) < kSmallChange) & (x > kShortest) & (next < p.high) &
                        (next > p.low) & !(turns & reaches);

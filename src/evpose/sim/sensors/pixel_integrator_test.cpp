@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "evpose/core/parallel.h"
+#include "evpose/sim/light/panes.h"
 #include "evpose/sim/light/test_scene.h"
 
 namespace evpose::sim {
@@ -68,7 +69,7 @@ ByPixel by_pixel(const std::vector<SimEvent>& events) {
 
 // An upright edge at y = 0, 2 m ahead, passes the camera at 0.9 m/s: 90 px/s. Every pixel that it crosses
 // whole must fire floor(ln(contrast) / threshold) times, when the area of the new side reaches it.
-void expect_theory(const Scene& scene, double left, double right) {
+void expect_theory(const Scene& scene, double left, double right, double tolerance_s = 20e-6) {
   Shot shot(scene, {0, -0.015, 0}, {0, 0.9, 0});
   const ByPixel events = by_pixel(shot.shoot());
   const double px_per_s = kFocal * 0.9 / 2;
@@ -90,7 +91,7 @@ void expect_theory(const Scene& scene, double left, double right) {
         const double sign = left > right ? 1 : -1;
         const double fraction = (right * std::exp(sign * 0.25 * (k + 1)) - right) / (left - right);
         EXPECT_EQ(at->second[k].on, left > right);
-        EXPECT_NEAR(to_seconds(at->second[k].t), enters + fraction / px_per_s, 20e-6)
+        EXPECT_NEAR(to_seconds(at->second[k].t), enters + fraction / px_per_s, tolerance_s)
             << x << " " << y << " " << k;
       }
     }
@@ -112,6 +113,29 @@ TEST(PixelIntegrator, OutlineBeforeAFarWallFiresWhenTheorySays) {
   expect_theory(plain.scene, 0.08, 0.5);
 }
 
+// A pane that mirrors nothing takes the same fraction of both sides.
+TEST(PixelIntegrator, StepEdgeThroughAPaneFiresAsWithout) {
+  TestScene plain;
+  plain.add({2, 0, -1}, {0, 0, 2}, {0, 1, 0}, 0.6);
+  plain.add({2, -1, -1}, {0, 0, 2}, {0, 1, 0}, 0.1);
+  plain.scene.panes = {{{1, -2, -2}, {0, 4, 0}, {0, 0, 4}}};
+  expect_theory(plain.scene, 0.6, 0.1);
+}
+
+// A pane 0.75 m ahead mirrors an edge 0.5 m behind the camera, which seems to be 2 m ahead. Four points of a
+// pixel are mirrored: half a pixel of motion is the bound of the error.
+TEST(PixelIntegrator, MirroredStepEdgeFiresWhenTheorySays) {
+  constexpr double kBehindPane = 0.02, kLeft = 0.9, kRight = 0.05, kHalfPixel_s = 0.5 / 90;
+  TestScene plain;
+  plain.add({2, -2, -2}, {0, 0, 4}, {0, 4, 0}, kBehindPane);
+  plain.add({-0.5, 0, -2}, {0, 2, 0}, {0, 0, 4}, kLeft);
+  plain.add({-0.5, -2, -2}, {0, 2, 0}, {0, 0, 4}, kRight);
+  plain.scene.panes = {{{0.75, -2, -2}, {0, 4, 0}, {0, 0, 4}}};
+  const PlateLight light = plate_light(1, kGlassIndex);
+  expect_theory(plain.scene, light.through * kBehindPane + light.mirrored * kLeft,
+                light.through * kBehindPane + light.mirrored * kRight, kHalfPixel_s);
+}
+
 // Across a slanted edge the area grows with the square of the way at first and at last: every event comes
 // within a fiftieth of a pixel of where the area reaches its threshold.
 TEST(PixelIntegrator, SlantedEdgeFiresWhenTheorySays) {
@@ -125,8 +149,8 @@ TEST(PixelIntegrator, SlantedEdgeFiresWhenTheorySays) {
     double sum = 0;
     for (const auto& [pixel, events] : by_pixel(shot.shoot())) {
       // Columns by which the edge has passed the centre of the pixel, and the area that it has then covered.
-      const auto passed = [&](double t_s) {
-        return 31.5 + kFocal * -0.015 / 2 + px_per_s * t_s + lean * (pixel.second - 23.5) - pixel.first;
+      const auto passed = [&, at = pixel](double t_s) {
+        return 31.5 + kFocal * -0.015 / 2 + px_per_s * t_s + lean * (at.second - 23.5) - at.first;
       };
       const auto luminance = [&](double way) {
         return 0.1 + 0.5 * fraction_above(static_cast<float>(way), {1, static_cast<float>(lean)});

@@ -102,8 +102,14 @@ def make_faults(bench):
 
 def make_calibration(bench):
     only = ["--only", "room_720p"] if bench.quick else []
-    printed = bench.once("calibration", lambda: bench.run("bench", "calibration", bench.shared / "data/peer", *only))
-    return bench.write_page("calibration", {"errors": printed.splitlines()})
+    data = bench.shared / "data/peer"
+    printed = bench.once("calibration", lambda: bench.run("bench", "calibration", data, *only))
+    only = only or [word for name in ("room_spiral", "room_people", "room_720p") for word in ("--only", name)]
+    errors = ["bench", "calibration-errors", data, *only]
+    alone = bench.once("calibration-errors", lambda: bench.run(*errors))
+    with_map = bench.once("calibration-errors-map", lambda: bench.run(*errors, "--set", "fusion.segment_offsets=on"))
+    return bench.write_page("calibration", {"errors": printed.splitlines(), "pose": alone.splitlines(),
+                                            "pose and map": with_map.splitlines()})
 
 
 def event_table(texts):

@@ -56,7 +56,8 @@ Expected<Setup> read_setup(const Parameters& parameters) {
                  chosen->T_cam_imu.value_or(Pose{}).inverse(),
                  out.has_imu ? MotionModel::imu : MotionModel::constant_velocity,
                  {},
-                 nullptr};
+                 nullptr,
+                 chosen->intrinsics};
   if (calibration->imu_noise) out.tracker.imu_noise = *calibration->imu_noise;
   if (!parameters.imu_model.empty()) {
     const auto noise = read_imu_noise(parameters.imu_model);

@@ -61,6 +61,16 @@ void add_calibration(CLI::App& bench, Run& run) {
       [=, &run] { run = [=] { return exit_status(experiments::print_calibration(*selection)); }; });
 }
 
+void add_calibration_errors(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand(
+      "calibration-errors", "Accuracy with a wrong calibration, believed and with its errors as states");
+  auto selection = std::make_shared<experiments::Selection>();
+  selection->only = {"room_spiral"};
+  add_selection(*command, *selection);
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_calibration_errors(*selection)); }; });
+}
+
 void add_relocalization(CLI::App& bench, Run& run) {
   auto* command = bench.add_subcommand("relocalization", "Starts from wrong poses");
   auto request = std::make_shared<experiments::RelocalizationRequest>();
@@ -181,6 +191,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_variants(*bench, run, "ablation", "What each module of the tracker brings",
                experiments::ablation_variants());
   add_calibration(*bench, run);
+  add_calibration_errors(*bench, run);
   add_relocalization(*bench, run);
   add_event_origins(*bench, run);
   add_faults(*bench, run);

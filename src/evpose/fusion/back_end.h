@@ -18,6 +18,8 @@ struct Calibration {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();           ///< true p_body_cam = given + shift, m
   Eigen::Vector2d gravity_tilt_rad =
       Eigen::Vector2d::Zero();  ///< true gravity turned about the map's x and y
+  /// Of the camera: true numbers minus given ones, as AdjustedCamera orders them; empty: not asked for.
+  Eigen::VectorXd intrinsics, intrinsics_sigma;
   double time_sigma_s = 0;
   Eigen::Vector3d shift_sigma_m = Eigen::Vector3d::Zero();
   Eigen::Vector2d gravity_sigma_rad = Eigen::Vector2d::Zero();

@@ -37,6 +37,10 @@ void CalibrationStates::start(ErrorStateFilter& filter) {
   if (config_.rotation) rotation_ = add(3, config_.start_rotation_sigma_rad);
   if (config_.translation) translation_ = add(3, config_.start_translation_sigma_m);
   if (config_.gravity) gravity_ = add(2, config_.start_gravity_sigma_rad);
+  if (config_.intrinsics) {
+    intrinsics_ = filter.add_block(config_.start_intrinsics_sigma);
+    found_.intrinsics.setZero(config_.start_intrinsics_sigma.size());
+  }
   state_sigmas(filter);
 }
 
@@ -89,6 +93,11 @@ std::vector<PoseShift> CalibrationStates::pose_shifts(const FusionState& state) 
   return shifts;
 }
 
+std::optional<BlockRow> CalibrationStates::row_of(const ContourOffset& contour) const {
+  if (!intrinsics_ || contour.by_intrinsics.size() != found_.intrinsics.size()) return std::nullopt;
+  return BlockRow{*intrinsics_, contour.by_intrinsics};
+}
+
 void CalibrationStates::apply_corrections(const ErrorStateFilter& filter, Eigen::Vector3d* gravity_map) {
   if (time_) found_.time_offset_s += filter.correction(*time_)(0);
   if (rotation_) {
@@ -96,6 +105,7 @@ void CalibrationStates::apply_corrections(const ErrorStateFilter& filter, Eigen:
     found_.turn = (so3::exp(turn) * found_.turn).normalized();
   }
   if (translation_) found_.shift += filter.correction(*translation_);
+  if (intrinsics_) found_.intrinsics += filter.correction(*intrinsics_);
   if (gravity_) {
     const Eigen::Vector2d tilt = filter.correction(*gravity_);
     found_.gravity_tilt_rad += tilt;
@@ -112,6 +122,7 @@ void CalibrationStates::state_sigmas(const ErrorStateFilter& filter) {
   if (rotation_) found_.turn_sigma_rad = sigma(*rotation_);
   if (translation_) found_.shift_sigma_m = sigma(*translation_);
   if (gravity_) found_.gravity_sigma_rad = sigma(*gravity_);
+  if (intrinsics_) found_.intrinsics_sigma = sigma(*intrinsics_);
 }
 
 }  // namespace evpose

@@ -10,8 +10,8 @@
 namespace evpose {
 
 /// The calibration as blocks of a filter: time offset between IMU and camera, rotation and translation of the
-/// camera in the body, and the direction of gravity in the map. While the motion cannot tell the first three
-/// from an error of the pose they are considered, not estimated.
+/// camera in the body, direction of gravity in the map, and the camera's intrinsics. While the motion cannot
+/// tell the first three from an error of the pose they are considered, not estimated.
 class CalibrationStates {
  public:
   CalibrationStates(const CalibrationConfig& config, const Pose& T_body_cam);
@@ -25,6 +25,10 @@ class CalibrationStates {
   void judge_excitation(ErrorStateFilter& filter);
   /// How the pose that the camera sees depends on the blocks.
   std::vector<PoseShift> pose_shifts(const FusionState& state) const;
+  /// Whether contours have to tell of the camera's numbers.
+  bool takes_contours() const { return config_.intrinsics; }
+  /// How the contour's residual depends on the camera's numbers, if they are states.
+  std::optional<BlockRow> row_of(const ContourOffset& contour) const;
   /// Takes over what the filter's last update found; turns the direction of gravity likewise.
   void apply_corrections(const ErrorStateFilter& filter, Eigen::Vector3d* gravity_map);
 
@@ -37,7 +41,7 @@ class CalibrationStates {
   Pose T_body_cam_;  ///< as given
   Calibration found_;
   bool started_ = false;
-  std::optional<BlockId> time_, rotation_, translation_, gravity_;
+  std::optional<BlockId> time_, rotation_, translation_, gravity_, intrinsics_;
   // Mean and mean square of (velocity, rate) over the last half second.
   Vector6d motion_mean_ = Vector6d::Zero(), motion_square_ = Vector6d::Zero();
   TimeNs judged_ = 0;

@@ -33,6 +33,13 @@ ImuSample moving(TimeNs t) {
           {1.5 * std::sin(4 * s), 1.2 * std::cos(7 * s), 9.81 + 2 * std::cos(6 * s)}};
 }
 
+/// Of a calibration that may be wrong by more than an ordinary one.
+CalibrationConfig coarse() {
+  CalibrationConfig c;
+  c.start_time_sigma_s = c.start_rotation_sigma_rad = 0.02;
+  return c;
+}
+
 Eigen::Vector3d draw(std::mt19937& random, double sigma) {
   std::normal_distribution<double> normal(0, sigma);
   return {normal(random), normal(random), normal(random)};
@@ -194,7 +201,7 @@ double rotation_error_deg(const Calibration& found, const Eigen::Vector3d& turn)
 }
 
 TEST(Calibration, TimeOffsetOfTwentyMillisecondsIsFoundToATenth) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.time_offset = true;
   for (const double offset_s : {-0.02, 0.0, 0.02}) {
     Wrong wrong;
@@ -207,7 +214,7 @@ TEST(Calibration, TimeOffsetOfTwentyMillisecondsIsFoundToATenth) {
 }
 
 TEST(Calibration, RotationOfOneDegreeIsFoundToAFiftieth) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.rotation = true;
   Wrong wrong;
   wrong.turn = Eigen::Vector3d(0.6, -0.5, 0.62) * (M_PI / 180);
@@ -217,7 +224,7 @@ TEST(Calibration, RotationOfOneDegreeIsFoundToAFiftieth) {
 }
 
 TEST(Calibration, APoseThatTheCameraFoundDoesNotVouchForTheBody) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.rotation = true;
   Wrong wrong;
   wrong.turn = Eigen::Vector3d(0.6, -0.5, 0.62) * (M_PI / 180);
@@ -226,7 +233,7 @@ TEST(Calibration, APoseThatTheCameraFoundDoesNotVouchForTheBody) {
 }
 
 TEST(Calibration, PlaceOfTheCameraIsFoundToAMillimetre) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.translation = true;
   Wrong wrong;
   wrong.shift = {0.01, -0.015, 0.008};
@@ -236,7 +243,7 @@ TEST(Calibration, PlaceOfTheCameraIsFoundToAMillimetre) {
 }
 
 TEST(Calibration, AllThreeAreFoundTogether) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;
   Wrong wrong;
   wrong.offset_s = 0.005;
@@ -249,7 +256,7 @@ TEST(Calibration, AllThreeAreFoundTogether) {
 }
 
 TEST(Calibration, InHoverItIsFrozenAndSaidSo) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;
   Wrong wrong;
   wrong.hover = true;
@@ -263,7 +270,7 @@ TEST(Calibration, InHoverItIsFrozenAndSaidSo) {
 }
 
 TEST(Calibration, TiltOfTheMapIsFound) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.gravity = true;
   Wrong wrong;
   wrong.tilt = {0.005, -0.004};
@@ -297,7 +304,7 @@ TEST(Calibration, WhatWasFoundOutlivesANewStart) {
 }
 
 TEST(Calibration, TheSeenPoseDependsOnItAsDifferencesSay) {
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;
   const Pose given{so3::exp({0.1, -1.2, 0.4}), {0.1, 0.02, -0.05}};
   ErrorStateFilter filter;
@@ -328,7 +335,7 @@ TEST(Calibration, TheSeenPoseDependsOnItAsDifferencesSay) {
 /// A camera that is mounted and timed otherwise than given, before a map whose segments stand off.
 TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
   constexpr int kRuns = 8, kSegments = 24, kStates = 7 + kSegments;
-  CalibrationConfig c;
+  CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;
   c.start_time_sigma_s = 3e-3;
   c.start_rotation_sigma_rad = 5e-3;

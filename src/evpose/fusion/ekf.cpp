@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/fusion/ekf.h"
 
+#include <array>
+
 namespace evpose {
 
 Ekf::Ekf(const StatePropagator& propagator, const FusionConfig& config, const Pose& T_body_cam)
@@ -29,20 +31,36 @@ void Ekf::predict(TimeNs t) {
 void Ekf::update(const PoseInformation& measurement, std::span<const ContourOffset> contours) {
   calibration_.judge_excitation(filter_);
   measurement_.start(measurement, calibration_.pose_shifts(state()));
-  if (offsets_) offsets_->add_to(measurement_, filter_, contours);
+  if (takes_contours()) add_contours(contours);
   filter_.update(measurement_);
-  if (offsets_) {
-    offsets_->apply_corrections(filter_);
-    share_of_blocks_ = filter_.share_of_blocks(measurement_);
-  }
+  if (offsets_) offsets_->apply_corrections(filter_);
+  if (takes_contours()) share_of_blocks_ = filter_.share_of_blocks(measurement_);
   Eigen::Vector3d gravity_map = propagator().gravity_map();
   calibration_.apply_corrections(filter_, &gravity_map);
   set_gravity_map(gravity_map);
 }
 
+/// Adds what the contours say about the blocks that they depend on one by one.
+void Ekf::add_contours(std::span<const ContourOffset> contours) {
+  const Eigen::Matrix3d R = state().nav.T_map_body.rotation();
+  std::array<BlockRow, 2> rows;
+  for (const ContourOffset& contour : contours) {
+    std::size_t n = 0;
+    double residual = contour.offset_px;
+    if (offsets_)
+      if (const auto effect = offsets_->effect(contour, filter_)) {
+        rows[n++] = effect->row;
+        residual -= effect->present_px;
+      }
+    if (const auto row = calibration_.row_of(contour)) rows[n++] = *row;
+    if (n > 0)
+      measurement_.add({contour.by_pose(R), contour.weight, residual, contour.offset_px, {rows.data(), n}});
+  }
+}
+
 Matrix6d Ekf::measured_covariance() const {
   const Matrix6d seen = filter_.seen_pose_covariance(calibration_.pose_shifts(state()));
-  return offsets_ ? Matrix6d(seen + share_of_blocks_) : seen;
+  return takes_contours() ? Matrix6d(seen + share_of_blocks_) : seen;
 }
 
 std::span<const SegmentOffsets::Segment> Ekf::segments() const {

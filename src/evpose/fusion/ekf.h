@@ -24,7 +24,7 @@ class Ekf : public BackEnd {
   void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
-  bool takes_contours() const override { return offsets_.has_value(); }
+  bool takes_contours() const override { return offsets_.has_value() || calibration_.takes_contours(); }
   const FusionState& state() const override { return filter_.state(); }
   Matrix6d measured_covariance() const override;
   Calibration calibration() const override { return calibration_.calibration(); }
@@ -34,6 +34,8 @@ class Ekf : public BackEnd {
   std::span<const SegmentOffsets::Segment> segments() const;
 
  private:
+  void add_contours(std::span<const ContourOffset> contours);
+
   ErrorStateFilter filter_;
   CalibrationStates calibration_;
   std::optional<SegmentOffsets> offsets_;

@@ -18,12 +18,15 @@ struct CalibrationConfig {
   bool rotation = false;     ///< of the camera in the body
   bool translation = false;  ///< likewise
   bool gravity = false;      ///< direction of gravity in the map: the map does not stand upright
-  double start_time_sigma_s = 0.02;
-  double start_rotation_sigma_rad = 0.02;
+  bool intrinsics = false;   ///< of the camera: focal lengths, principal point, distortion
+  double start_time_sigma_s = 2e-3;
+  double start_rotation_sigma_rad = 5e-3;
   double start_translation_sigma_m = 0.01;
   double start_gravity_sigma_rad = 5e-3;  ///< about each horizontal axis
 
-  bool any() const { return time_offset || rotation || translation || gravity; }
+  Eigen::VectorXd start_intrinsics_sigma;  ///< as AdjustedCamera orders them; the tracker fills it in
+
+  bool any() const { return time_offset || rotation || translation || gravity || intrinsics; }
 };
 void describe(ConfigTable& table, CalibrationConfig& config);
 

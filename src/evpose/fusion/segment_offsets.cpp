@@ -41,24 +41,17 @@ SegmentOffsets::Segment* SegmentOffsets::find_or_add(const ContourOffset& contou
   return &segments_[place];
 }
 
-void SegmentOffsets::add_to(JointMeasurement& measurement, ErrorStateFilter& filter,
-                            std::span<const ContourOffset> contours) {
-  const Eigen::Matrix3d R = filter.state().nav.T_map_body.rotation();
-  for (const ContourOffset& contour : contours) {
-    const Eigen::Vector3d across = R * contour.across_body;
-    const double length = across.norm();
-    const Segment* segment = length > 0 ? find_or_add(contour, across / length, filter) : nullptr;
-    if (segment == nullptr) continue;
-    Vector6d by_pose;
-    by_pose.head<3>() = across;
-    by_pose.tail<3>() = contour.point_body.cross(contour.across_body);
-    // The contour's point moves against the pose and with the segment. The registration has it at the map's
-    // place, the filter where the segment is known to be.
-    const double by_offset = -across.dot(segment->across_map);
-    const double residual = contour.offset_px - by_offset * segment->offset_m;
-    const BlockRow row{segment->block, BlockRow::Derivative::Constant(1, by_offset)};
-    measurement.add({by_pose, contour.weight, residual, contour.offset_px, {&row, 1}});
-  }
+std::optional<SegmentOffsets::Effect> SegmentOffsets::effect(const ContourOffset& contour,
+                                                             ErrorStateFilter& filter) {
+  const Eigen::Vector3d across = filter.state().nav.T_map_body.rotation() * contour.across_body;
+  const double length = across.norm();
+  const Segment* segment = length > 0 ? find_or_add(contour, across / length, filter) : nullptr;
+  if (segment == nullptr) return std::nullopt;
+  // The contour's point moves against the pose and with the segment. The registration has it at the map's
+  // place, the filter where the segment is known to be.
+  const double by_offset = -across.dot(segment->across_map);
+  return Effect{{segment->block, BlockRow::Derivative::Constant(1, by_offset)},
+                by_offset * segment->offset_m};
 }
 
 void SegmentOffsets::apply_corrections(const ErrorStateFilter& filter) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -21,10 +22,13 @@ class SegmentOffsets {
   explicit SegmentOffsets(const SegmentOffsetConfig& config) : config_(config) {}
 
   void remove_all(ErrorStateFilter& filter);
-  /// Adds to the measurement what the contours say about the offsets of their segments; a segment that is
-  /// seen for the first time becomes a state.
-  void add_to(JointMeasurement& measurement, ErrorStateFilter& filter,
-              std::span<const ContourOffset> contours);
+  /// How a contour's residual depends on the offset of its segment.
+  struct Effect {
+    BlockRow row;
+    double present_px;  ///< the part that the segment's present offset explains
+  };
+  /// A segment that is seen for the first time becomes a state. None: there is no state for it.
+  std::optional<Effect> effect(const ContourOffset& contour, ErrorStateFilter& filter);
   /// Takes over what the filter's last update found.
   void apply_corrections(const ErrorStateFilter& filter);
 

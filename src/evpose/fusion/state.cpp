@@ -30,6 +30,13 @@ PoseInformation moved(const PoseInformation& m, const Pose& measured_at, const P
   return {J.transpose() * m.information * J, J.transpose() * (m.vector - m.information * d)};
 }
 
+Vector6d ContourOffset::by_pose(const Eigen::Matrix3d& R_map_body) const {
+  Vector6d out;
+  out.head<3>() = R_map_body * across_body;
+  out.tail<3>() = point_body.cross(across_body);
+  return out;
+}
+
 double innovation(const Matrix6d& pose_covariance, const PoseInformation& m) {
   // z = H^-1 b has covariance P + H^-1, so that NIS = z^T (P + H^-1)^-1 z = b^T (H + H P H)^-1 b on H's
   // range.

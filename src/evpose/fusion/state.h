@@ -56,6 +56,11 @@ struct ContourOffset {
   double weight = 0;            ///< px^-2
   std::uint32_t segment = 0;    ///< of the map, as the back end has it cut
   double sigma_m = 0;           ///< error of the contour that the map states
+  /// Derivative of an event's signed distance by the numbers of the camera; empty: not asked for.
+  Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 9> by_intrinsics{};
+
+  /// Derivative of the distance by the pose at which it was measured, as Pose::plus.
+  Vector6d by_pose(const Eigen::Matrix3d& R_map_body) const;
 };
 
 /// Normalised innovation squared of a measurement relative to a predicted pose of this covariance, divided by

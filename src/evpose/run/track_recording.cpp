@@ -150,9 +150,12 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
   job.map = *map;
   job.truth = std::move(truth);
   job.start = *start;
-  job.setup = {*camera, recording.T_cam_body.inverse(),
-               recording.has_imu ? MotionModel::imu : MotionModel::constant_velocity, recording.imu_noise,
-               *map};
+  job.setup = {*camera,
+               recording.T_cam_body.inverse(),
+               recording.has_imu ? MotionModel::imu : MotionModel::constant_velocity,
+               recording.imu_noise,
+               *map,
+               recording.camera};
   job.start_words = start_words(request.init, !job.truth.empty());
   for (const auto& doubt : {doubt_map_size(**map), doubt_start_place(**map, start->T_map_body)})
     if (doubt) job.findings.push_back(*doubt);

@@ -17,10 +17,11 @@ double median(std::vector<double>& values) {
 }  // namespace
 
 ContourSelection::ContourSelection(const ContourIndex& index, const ContourSegments& segments,
-                                   const Camera& camera, const Pose& T_body_cam,
-                                   const VisibleSetConfig& config, double map_sigma_m, bool own_thread)
+                                   const Camera& camera, const Camera& choosing_camera,
+                                   const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m,
+                                   bool own_thread)
     : view_{index.map(), segments, camera, T_body_cam, map_sigma_m},
-      visible_(index, camera, config, own_thread) {}
+      visible_(index, choosing_camera, config, own_thread) {}
 
 void ContourSelection::choose(const FusionState& state, double span_s) {
   const auto& chosen = visible_.choose(state.nav.T_map_body * view_.T_body_cam);

@@ -13,10 +13,12 @@ namespace evpose {
 /// The view-limited, occlusion-aware part of the map (EV-Pose 5.3), as samples for the registration.
 class ContourSelection {
  public:
-  /// `map_sigma_m`: of contour points that state none. References are kept, but for the configuration.
+  /// `camera` projects the points; it may be corrected meanwhile. `choosing_camera`, which may not, decides
+  /// which are in view. `map_sigma_m`: of contour points that state none. References are kept, but for the
+  /// configuration.
   ContourSelection(const ContourIndex& index, const ContourSegments& segments, const Camera& camera,
-                   const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m,
-                   bool own_thread);
+                   const Camera& choosing_camera, const Pose& T_body_cam, const VisibleSetConfig& config,
+                   double map_sigma_m, bool own_thread);
 
   /// The first choice of points is the dearest: made before the data come.
   void prepare(const Pose& T_map_body) { visible_.choose(T_map_body * view_.T_body_cam); }

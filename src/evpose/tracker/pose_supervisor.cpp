@@ -6,6 +6,11 @@
 #include "evpose/tracker/pose_uncertainty.h"
 
 namespace evpose {
+namespace {
+
+constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
+
+}  // namespace
 
 void PoseSupervisor::start(const FusionState& first, double sigma_px) {
   health_.start(first.t);
@@ -49,9 +54,7 @@ bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const
   return !r.consistent || (health == Health::lost && !verifying());
 }
 
-bool PoseSupervisor::search_is_due() const {
-  return config_.on && !searching() && astray_s_ > config_.patience_s;
-}
+bool PoseSupervisor::search_is_due() const { return config_.on && !searching() && astray_s_ > kPatience_s; }
 
 std::string PoseSupervisor::refusal(TimeNs t, const RegistrationResult& r, double innovation) const {
   if (searching() || found_pose_is_refuted(t, r)) return "searching for the pose";

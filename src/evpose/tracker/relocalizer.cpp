@@ -52,8 +52,6 @@ void describe(ConfigTable& table, RelocalizationConfig& c) {
   table.add("position_sigma_m", c.position_sigma_m, "m", "of the search region after a loss", {1e-3, 10});
   table.add("rotation_sigma_rad", c.rotation_sigma_rad, "rad", "of the search region after a loss",
             {1e-4, 1});
-  table.add("patience_s", c.patience_s, "s",
-            "lost, or with a pose that is not consistent with the map, for so long: search", {0, 100});
 }
 
 Relocalizer::Workspace::Workspace(const RelocalizerScene& scene, const HypothesisMotion& motion)

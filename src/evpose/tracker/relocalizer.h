@@ -22,7 +22,6 @@ struct RelocalizationConfig {
   bool on = true;
   double position_sigma_m = 0.1;      ///< of the search region around the last pose after a loss, per axis
   double rotation_sigma_rad = 0.035;  ///< likewise
-  double patience_s = 0.5;  ///< lost, or with a pose that is not consistent with the map, for so long: search
 };
 void describe(ConfigTable& table, RelocalizationConfig& config);
 

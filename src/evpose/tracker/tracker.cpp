@@ -79,18 +79,32 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   if (!fusion) return fusion.error();
   TrackerConfig resolved_config = config;
   resolved_config.fusion = *fusion;
-  return std::unique_ptr<Tracker>(new Tracker(setup, resolved_config, start, std::move(clock)));
+  CalibrationConfig& calibration = resolved_config.fusion.calibration;
+  if (!calibration.intrinsics)
+    return std::unique_ptr<Tracker>(new Tracker(setup, resolved_config, start, std::move(clock), nullptr));
+  if (!setup.intrinsics)
+    return Error{"fusion.calibration.intrinsics", "the camera's numbers are not known here",
+                 "give them in TrackerSetup::intrinsics"};
+  auto adjusted = AdjustedCamera::create(*setup.intrinsics);
+  if (!adjusted) return adjusted.error();
+  TrackerSetup own = setup;
+  own.camera = *adjusted;
+  calibration.start_intrinsics_sigma = ordinary_intrinsics_sigma(*setup.intrinsics);
+  return std::unique_ptr<Tracker>(
+      new Tracker(own, resolved_config, start, std::move(clock), std::move(*adjusted)));
 }
 
 Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start,
-                 StageClock clock)
+                 StageClock clock, std::shared_ptr<AdjustedCamera> adjusted)
     : setup_(setup),
+      adjusted_(std::move(adjusted)),
       config_(config),
       T_body_cam_(setup.T_body_cam),
       index_(*setup_.map),
       segments_(cut_into_segments(*setup_.map)),
-      contours_(index_, segments_, *setup_.camera, T_body_cam_, visible_config(config),
-                config.event_registration.map_sigma_m, config.threads > 1),
+      contours_(index_, segments_, *setup_.camera, adjusted_ ? adjusted_->given() : *setup_.camera,
+                T_body_cam_, visible_config(config), config.event_registration.map_sigma_m,
+                config.threads > 1),
       preprocessor_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
@@ -196,20 +210,29 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   return result;
 }
 
+ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
+  const Pose& predicted = fusion_->state().nav.T_map_body;
+  const ContourSample& s = contours_.samples()[offset.sample];
+  ContourOffset out{predicted.inverse() * setup_.map->position(s.point),
+                    predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()),
+                    offset.offset_px,
+                    offset.weight,
+                    offset_segments_.empty() ? s.segment : offset_segments_[s.point],
+                    setup_.map->points[s.point].sigma};
+  if (!adjusted_) return out;
+  const auto by_numbers = adjusted_->by_numbers(T_body_cam_.inverse() * out.point_body);
+  if (by_numbers) out.by_intrinsics = -s.normal_px.transpose() * *by_numbers;
+  return out;
+}
+
 void Tracker::fuse(const RegistrationResult& measurement) {
-  const Pose predicted = fusion_->state().nav.T_map_body;
   offsets_.clear();
   if (fusion_->takes_contours())
-    for (const SampleOffset& offset : registration_->offsets()) {
-      const ContourSample& s = contours_.samples()[offset.sample];
-      offsets_.push_back({predicted.inverse() * setup_.map->position(s.point),
-                          predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()), offset.offset_px,
-                          offset.weight, offset_segments_.empty() ? s.segment : offset_segments_[s.point],
-                          setup_.map->points[s.point].sigma});
-    }
+    for (const SampleOffset& offset : registration_->offsets()) offsets_.push_back(contour_offset(offset));
   fusion_->update({measurement.information, measurement.vector}, offsets_);
   const Calibration found = fusion_->calibration();
   T_body_cam_ = {found.turn * setup_.T_body_cam.q, setup_.T_body_cam.p + found.shift};
+  if (adjusted_) adjusted_->set_correction(found.intrinsics);
 }
 
 void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement,

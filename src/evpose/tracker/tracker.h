@@ -3,10 +3,11 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "evpose/camera/camera.h"
+#include "evpose/camera/adjusted_camera.h"
 #include "evpose/core/error.h"
 #include "evpose/map/contour_segments.h"
 #include "evpose/registration/registration.h"
@@ -29,6 +30,7 @@ struct TrackerSetup {
   MotionModel motion = MotionModel::imu;
   ImuNoise imu_noise;
   std::shared_ptr<const ContourMap> map;
+  std::optional<CameraIntrinsics> intrinsics = {};  ///< of the camera, if they are to be estimated
 };
 
 /// Where it starts.
@@ -80,7 +82,9 @@ class Tracker {
   std::vector<Snapshot::Point> chosen_points(double decay_s) const;
 
  private:
-  Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock);
+  /// `adjusted`: the setup's camera if its numbers are estimated, else null.
+  Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock,
+          std::shared_ptr<AdjustedCamera> adjusted);
 
   void make_due_updates();
   void make_update();
@@ -90,11 +94,13 @@ class Tracker {
   Update update(TimeNs t);
   void search_pose(TimeNs t, const ImuIncrement& moved);
   RegistrationResult measure(TimeNs t, double span_s);
+  ContourOffset contour_offset(const SampleOffset& offset) const;
   void fuse(const RegistrationResult& measurement);
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);
   std::string fault(TimeNs t, const RegistrationResult& measurement) const;
 
   TrackerSetup setup_;
+  std::shared_ptr<AdjustedCamera> adjusted_;  ///< is setup_.camera, or null
   TrackerConfig config_;
   Pose T_body_cam_;  ///< as given, and as the fusion has corrected it
   ContourIndex index_;

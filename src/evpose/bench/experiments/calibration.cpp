@@ -8,6 +8,7 @@ namespace evpose::experiments {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
+constexpr double kSpoiltTimeSigma_s = 0.02, kSpoiltRotationSigma_rad = 0.02;  // for errors of 20 ms, 1 deg
 constexpr double kShiftedStartSigma_m = 0.01;  // of a start whose camera is said to be elsewhere
 
 /// By how much a given calibration is wrong.
@@ -35,6 +36,8 @@ struct CalibrationOutcome {
 /// Makes the given calibration wrong and lets the tracker estimate what is wrong with it.
 void spoil(const CalibrationError& error, Streams& streams) {
   FusionConfig& fusion = streams.job.config.tracker.fusion;
+  fusion.calibration.start_time_sigma_s = kSpoiltTimeSigma_s;
+  fusion.calibration.start_rotation_sigma_rad = kSpoiltRotationSigma_rad;
   fusion.calibration.time_offset = error.offset_s != 0 || !(error.turned() || error.shifted());
   fusion.calibration.translation = error.shifted();
   fusion.calibration.rotation = error.turned();

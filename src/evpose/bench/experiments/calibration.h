@@ -9,4 +9,8 @@ namespace evpose::experiments {
 /// of them: time offset, rotation and place of the camera.
 Status print_calibration(const Selection& selection);
 
+/// The accuracy of the pose with calibrations of ordinary errors: believed as given, and with their errors as
+/// states of the filter. Start from the true pose of the body.
+Status print_calibration_errors(const Selection& selection);
+
 }  // namespace evpose::experiments

@@ -36,8 +36,8 @@ class PosedRegistration {
         poses_(poses),
         index_(*job.map),
         segments_(cut_into_segments(*job.map)),
-        contours_(index_, segments_, *job.setup.camera, job.setup.T_body_cam, config_.visible,
-                  config_.event_registration.map_sigma_m, false),
+        contours_(index_, segments_, *job.setup.camera, *job.setup.camera, job.setup.T_body_cam,
+                  config_.visible, config_.event_registration.map_sigma_m, false),
         preprocessor_(job.setup.camera->size().width, job.setup.camera->size().height, config_.events),
         registration_(job.setup.camera->size(), config_.event_registration, segments_.count),
         counter_(job.setup.camera->size(), *job.map) {}

@@ -204,7 +204,7 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   problem.view = &contours_.view();
   problem.T_map_body = fusion_->state().nav.T_map_body;
   if (verdict_callback_) problem.verdicts = &verdicts_;
-  const RegistrationResult result = registration_->measure(problem);
+  RegistrationResult result = registration_->measure(problem);
   if (verdict_callback_ && verdicts_.size() == preprocessor_.kept().size())
     verdict_callback_(preprocessor_.kept(), verdicts_);
   return result;

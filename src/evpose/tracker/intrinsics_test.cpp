@@ -90,6 +90,11 @@ class Flight {
     for (int i = 0; i < kNumbers; ++i) wanted.push_back(15 + i);
     return all(wanted, wanted);
   }
+  /// Normalised estimation error squared, by its degrees of freedom.
+  double nees() const {
+    const Eigen::VectorXd e = error();
+    return e.dot(covariance().ldlt().solve(e)) / static_cast<double>(e.size());
+  }
   const Ekf& ekf() const { return *ekf_; }
 
  private:
@@ -134,13 +139,12 @@ TEST(Intrinsics, AreFoundWithThePoseUnderTheirStatedSigma) {
   for (unsigned run = 0; run < kRuns; ++run) {
     Flight flight(300 + run);
     flight.fly(2);
-    const Eigen::VectorXd error = flight.error();
-    nees += error.dot(flight.covariance().ldlt().solve(error)) / static_cast<double>(error.size()) / kRuns;
+    nees += flight.nees() / kRuns;
     const Eigen::VectorXd start = ordinary_intrinsics_sigma(kGiven);
     const Eigen::VectorXd sigma = flight.ekf().calibration().intrinsics_sigma;
     for (Eigen::Index i = 0; i < kNumbers; ++i)
       EXPECT_LT(sigma(i), (i < 6 ? 0.1 : 0.3) * start(i)) << "number " << i;
-    EXPECT_LT(1e3 * error.head<3>().norm(), 2);  // mm
+    EXPECT_LT(1e3 * flight.error().head<3>().norm(), 2);  // mm
   }
   EXPECT_NEAR(nees, 1, 0.4);
 }
@@ -151,8 +155,7 @@ TEST(Intrinsics, FromTheFirstUpdateOnTheCovarianceCoversWhatTheyDoToThePose) {
   for (unsigned run = 0; run < kRuns; ++run) {
     Flight flight(500 + run);
     flight.fly(0.1);
-    const Eigen::VectorXd error = flight.error();
-    nees += error.dot(flight.covariance().ldlt().solve(error)) / static_cast<double>(error.size()) / kRuns;
+    nees += flight.nees() / kRuns;
   }
   EXPECT_NEAR(nees, 1, 0.3);
 }

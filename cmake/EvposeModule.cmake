@@ -47,11 +47,12 @@ if(EVPOSE_SANITIZE)
   add_link_options(-fsanitize=${EVPOSE_SANITIZE})
 endif()
 
-# Eigen lays out its small vectors by the instruction set of the *including* file: fix it, so that a consumer
-# compiled for another processor agrees with the library about every struct.
+# Eigen lays out its small vectors, and takes memory for its large ones, by the instruction set of the *including*
+# file: fix both, so that a consumer compiled for another processor agrees with the library about every struct and
+# gives memory back the way it was taken.
 add_library(evpose_eigen INTERFACE)
 target_link_libraries(evpose_eigen INTERFACE Eigen3::Eigen)
-target_compile_definitions(evpose_eigen INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+target_compile_definitions(evpose_eigen INTERFACE EIGEN_MAX_STATIC_ALIGN_BYTES=16 EIGEN_MAX_ALIGN_BYTES=32)
 set_target_properties(evpose_eigen PROPERTIES EXPORT_NAME eigen)
 
 # Precompiled headers: outside headers that nearly every source includes. Headers of the project are not among them: a

@@ -104,12 +104,34 @@ def make_calibration(bench):
     only = ["--only", "room_720p"] if bench.quick else []
     data = bench.shared / "data/peer"
     printed = bench.once("calibration", lambda: bench.run("bench", "calibration", data, *only))
-    only = only or [word for name in ("room_spiral", "room_people", "room_720p") for word in ("--only", name)]
-    errors = ["bench", "calibration-errors", data, *only]
-    alone = bench.once("calibration-errors", lambda: bench.run(*errors))
-    with_map = bench.once("calibration-errors-map", lambda: bench.run(*errors, "--set", "fusion.segment_offsets=on"))
+    every = only or [word for name in harness.PEER for word in ("--only", name)]
+    draws = ["--draws", 2 if bench.quick else 8]
+    alone = bench.once("calibration-errors", lambda: bench.run("bench", "calibration-errors", data, *every, *draws))
     return bench.write_page("calibration", {"errors": printed.splitlines(), "pose": alone.splitlines(),
-                                            "pose and map": with_map.splitlines()})
+                                            "summary": calibration_summary(tables.read(alone)[""])})
+
+
+def calibration_summary(rows):
+    """Over the drawn calibrations of each recording."""
+    lines = []
+    for recording in dict.fromkeys(row["recording"] for row in rows):
+        own = [row for row in rows if row["recording"] == recording]
+        true = next(row for row in own if row["given wrong"] == "nothing")
+        drawn = [row for row in own if row["given wrong"].startswith("draw")]
+
+        def column(name, drawn=drawn):
+            return [float(row[name]) for row in drawn if re.fullmatch(r"[0-9.]+", row[name])]
+
+        def mean(name, digits=1):
+            values = column(name)
+            return f"{sum(values) / len(values):.{digits}f}" if values else "-"
+
+        lines.append([recording, true["camera mm"], true["told: camera mm"], mean("camera mm"), mean("NEES/6", 0),
+                      mean("silently wrong %", 0), mean("told: camera mm"), f"{max(column('told: camera mm'), default=0):.1f}",
+                      mean("told: body mm"), mean("told: NEES/6", 2), mean("told: silently wrong %", 1)])
+    return tables.table(["recording", "true, known: camera mm", "true, told: camera mm", "drawn, believed: camera mm", "NEES/6",
+                         "silently wrong %", "drawn, told: camera mm", "worst", "body mm", "told: NEES/6",
+                         "told: silently wrong %"], lines)
 
 
 def event_table(texts):

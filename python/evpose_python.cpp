@@ -52,6 +52,7 @@ class PyTracker {
     TrackerSetup setup;
     setup.camera = value_of(make_camera(*chosen.intrinsics));
     setup.intrinsics = chosen.intrinsics;
+    setup.calibration_sigma = chosen.sigma;
     setup.T_body_cam = chosen.T_cam_imu.value_or(Pose{}).inverse();
     has_imu_ = chosen.T_cam_imu.has_value();
     setup.motion = has_imu_ ? MotionModel::imu : MotionModel::constant_velocity;

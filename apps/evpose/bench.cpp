@@ -65,10 +65,14 @@ void add_calibration_errors(CLI::App& bench, Run& run) {
   auto* command = bench.add_subcommand(
       "calibration-errors", "Accuracy with a wrong calibration, believed and with its errors as states");
   auto selection = std::make_shared<experiments::Selection>();
+  auto draws = std::make_shared<int>(0);
   selection->only = {"room_spiral"};
   add_selection(*command, *selection);
-  command->callback(
-      [=, &run] { run = [=] { return exit_status(experiments::print_calibration_errors(*selection)); }; });
+  command->add_option("--draws", *draws, "sets of all errors of an ordinary calibration together")
+      ->check(CLI::Range(0, 10000));
+  command->callback([=, &run] {
+    run = [=] { return exit_status(experiments::print_calibration_errors(*selection, *draws)); };
+  });
 }
 
 void add_relocalization(CLI::App& bench, Run& run) {

@@ -42,6 +42,7 @@ Expected<TrackJob> prepare_source(const ServeRequest& request, const RunConfig& 
   Recording recording;
   recording.folder = recording.name = track.recording;
   recording.camera = *chosen->intrinsics;
+  recording.calibration_sigma = chosen->sigma;
   recording.calibration_path = track.calibration;
   recording.has_imu = chosen->T_cam_imu.has_value() && (!is_metavision_address(track.recording) ||
                                                         metavision_address_has_imu(track.recording));

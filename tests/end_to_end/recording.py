@@ -22,6 +22,10 @@ CALIBRATION = f"""cam0:
   - [0.0, 0.0, 0.0, 1.0]
   timeshift_cam_imu: 0.0
 """
+KNOWN = """  intrinsics_sigma: [0, 0, 0, 0]
+  T_cam_imu_sigma: [0, 0]
+  timeshift_sigma: 0
+"""
 IMU_MODEL = """accelerometer_noise_density: 0.002
 accelerometer_random_walk: 0.0003
 gyroscope_noise_density: 0.0004
@@ -56,7 +60,7 @@ def wall_contours():
 class Recording:
     def __init__(self, duration_s=0.6):
         self.contours = wall_contours()
-        self.calibration = CALIBRATION
+        self.calibration = CALIBRATION + KNOWN
         self.imu_model = IMU_MODEL
         self.imu_t_ns = np.arange(0, int(duration_s * 1e9) + 1, 2_000_000)
         noise = np.random.default_rng(1).normal(size=(len(self.imu_t_ns), 6))  # no real axis stands still

@@ -32,16 +32,6 @@ AdjustedCamera::Correction per_px(const CameraIntrinsics& c) {
 
 }  // namespace
 
-Eigen::VectorXd ordinary_intrinsics_sigma(const CameraIntrinsics& intrinsics) {
-  constexpr double kFocal = 3e-3, kCentre_px = 1, kFirstRadial = 0.01, kRadial = 0.02, kTangential = 5e-4;
-  Eigen::VectorXd sigma(4 + static_cast<Eigen::Index>(intrinsics.distortion.size()));
-  sigma.head<4>() << kFocal * intrinsics.fx, kFocal * intrinsics.fy, kCentre_px, kCentre_px;
-  for (Eigen::Index i = 4; i < sigma.size(); ++i) sigma(i) = i == 4 ? kFirstRadial : kRadial;
-  if (intrinsics.distortion_model == "radtan") sigma.segment<2>(6).setConstant(kTangential);
-  if (intrinsics.distortion_model == "ds") sigma.tail<2>().setConstant(kFirstRadial);
-  return sigma;
-}
-
 Expected<std::shared_ptr<AdjustedCamera>> AdjustedCamera::create(const CameraIntrinsics& given) {
   const auto camera = make_camera(given);
   if (!camera) return camera.error();

@@ -10,9 +10,6 @@
 
 namespace evpose {
 
-/// Standard deviations that an ordinary calibration leaves, in the order of AdjustedCamera.
-Eigen::VectorXd ordinary_intrinsics_sigma(const CameraIntrinsics& intrinsics);
-
 /// A camera whose given intrinsics are corrected while it is in use. The numbers stand in the order fx, fy,
 /// cx, cy (px), then `CameraIntrinsics::distortion`.
 class AdjustedCamera final : public Camera {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "evpose/camera/calibration_sigma.h"
+
 namespace evpose {
 namespace {
 
@@ -77,13 +79,13 @@ TEST(AdjustedCamera, ACorrectionThatMakesNoCameraIsNotTaken) {
 
 TEST(AdjustedCamera, OrdinarySigmasHaveTheOrderOfTheNumbers) {
   for (const CameraIntrinsics& c : kCameras) {
-    const Eigen::VectorXd sigma = ordinary_intrinsics_sigma(c);
+    const Eigen::VectorXd sigma = CalibrationSigma{}.of_intrinsics(c);
     ASSERT_EQ(static_cast<std::size_t>(sigma.size()), 4 + c.distortion.size());
     EXPECT_DOUBLE_EQ(sigma(1), 3e-3 * c.fy);
     EXPECT_GT(sigma.minCoeff(), 0);
   }
-  EXPECT_DOUBLE_EQ(ordinary_intrinsics_sigma(kCameras[1])(7), 5e-4);
-  EXPECT_DOUBLE_EQ(ordinary_intrinsics_sigma(kCameras[1])(8), 0.02);
+  EXPECT_DOUBLE_EQ(CalibrationSigma{}.of_intrinsics(kCameras[1])(7), 5e-4);
+  EXPECT_DOUBLE_EQ(CalibrationSigma{}.of_intrinsics(kCameras[1])(8), 0.02);
 }
 
 }  // namespace

@@ -8,6 +8,16 @@
 
 namespace evpose {
 
+Eigen::MatrixXd BackEnd::seen_covariance() const {
+  static_assert(error_state::kV == 6);
+  return state().covariance.topLeftCorner<9, 9>();
+}
+
+void BackEnd::update(const SeenMeasurement& measurement) {
+  EVPOSE_CHECK(measurement.vector.size() == 6);
+  update(PoseInformation{measurement.information, measurement.vector}, {});
+}
+
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,
                                        const Pose& T_body_cam) {
   const StatePropagator propagator(model, config, noise);

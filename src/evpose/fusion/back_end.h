@@ -27,6 +27,13 @@ struct Calibration {
   bool frozen = true;  ///< too little motion to tell it from an error of the pose
 };
 
+/// The pose that is seen and the camera's numbers, measured together: near the present values their cost is
+/// d^T information d / 2 - vector^T d, with d = (pose as Pose::plus, numbers).
+struct SeenMeasurement {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd vector;
+};
+
 /// What the tracker asks of a fusion framework. Time goes forward: start, then predict and update in turn.
 class BackEnd {
  public:
@@ -53,6 +60,10 @@ class BackEnd {
 
   /// Of the pose that the next measurement will see: the state's, and what further states add.
   virtual Matrix6d measured_covariance() const { return state().pose_covariance(); }
+  /// The same with the velocity (3) and the camera's numbers, as far as these are states.
+  virtual Eigen::MatrixXd seen_covariance() const;
+  /// A measurement without velocity. The numbers' part is for a framework in which they are states.
+  virtual void update(const SeenMeasurement& measurement);
   virtual Calibration calibration() const { return {}; }
 
   const StatePropagator& propagator() const { return propagator_; }

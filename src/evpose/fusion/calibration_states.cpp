@@ -30,17 +30,16 @@ void CalibrationStates::start(ErrorStateFilter& filter) {
     return;
   }
   started_ = true;
-  const auto add = [&](int size, double sigma) {
-    return filter.add_block(Eigen::VectorXd::Constant(size, sigma));
+  const auto add = [&](bool asked, const Eigen::VectorXd& sigma) -> std::optional<BlockId> {
+    if (!asked || !(sigma.array() > 0).any()) return std::nullopt;
+    return filter.add_block(sigma);
   };
-  if (config_.time_offset) time_ = add(1, config_.start_time_sigma_s);
-  if (config_.rotation) rotation_ = add(3, config_.start_rotation_sigma_rad);
-  if (config_.translation) translation_ = add(3, config_.start_translation_sigma_m);
-  if (config_.gravity) gravity_ = add(2, config_.start_gravity_sigma_rad);
-  if (config_.intrinsics) {
-    intrinsics_ = filter.add_block(config_.start_intrinsics_sigma);
-    found_.intrinsics.setZero(config_.start_intrinsics_sigma.size());
-  }
+  time_ = add(config_.time_offset, Eigen::VectorXd::Constant(1, config_.start_time_sigma_s));
+  rotation_ = add(config_.rotation, config_.start_rotation_sigma_rad);
+  translation_ = add(config_.translation, config_.start_translation_sigma_m);
+  gravity_ = add(config_.gravity, Eigen::VectorXd::Constant(2, config_.start_gravity_sigma_rad));
+  intrinsics_ = add(config_.intrinsics, config_.start_intrinsics_sigma);
+  if (intrinsics_) found_.intrinsics.setZero(config_.start_intrinsics_sigma.size());
   state_sigmas(filter);
 }
 

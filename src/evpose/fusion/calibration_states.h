@@ -25,8 +25,10 @@ class CalibrationStates {
   void judge_excitation(ErrorStateFilter& filter);
   /// How the pose that the camera sees depends on the blocks.
   std::vector<PoseShift> pose_shifts(const FusionState& state) const;
+  /// The camera's numbers, if they are states.
+  std::optional<BlockId> intrinsics() const { return intrinsics_; }
   /// Whether contours have to tell of the camera's numbers.
-  bool takes_contours() const { return config_.intrinsics; }
+  bool takes_contours() const { return intrinsics_.has_value(); }
   /// How the contour's residual depends on the camera's numbers, if they are states.
   std::optional<BlockRow> row_of(const ContourOffset& contour) const;
   /// Takes over what the filter's last update found; turns the direction of gravity likewise.

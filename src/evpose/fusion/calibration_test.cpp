@@ -36,7 +36,8 @@ ImuSample moving(TimeNs t) {
 /// Of a calibration that may be wrong by more than an ordinary one.
 CalibrationConfig coarse() {
   CalibrationConfig c;
-  c.start_time_sigma_s = c.start_rotation_sigma_rad = 0.02;
+  c.start_time_sigma_s = 0.02;
+  c.start_rotation_sigma_rad.setConstant(0.02);
   return c;
 }
 
@@ -338,8 +339,8 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
   CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;
   c.start_time_sigma_s = 3e-3;
-  c.start_rotation_sigma_rad = 5e-3;
-  c.start_translation_sigma_m = 5e-3;
+  c.start_rotation_sigma_rad.setConstant(5e-3);
+  c.start_translation_sigma_m.setConstant(5e-3);
   FusionConfig config = flight_config(c);
   config.segment_offsets = SegmentOffsetUse::on;
   config.segments.sigma_m = 3e-3;
@@ -350,8 +351,8 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
     std::mt19937 random(100 + run);
     Wrong wrong;
     wrong.offset_s = draw(random, c.start_time_sigma_s).x();
-    wrong.turn = draw(random, c.start_rotation_sigma_rad);
-    wrong.shift = draw(random, c.start_translation_sigma_m);
+    wrong.turn = draw(random, c.start_rotation_sigma_rad.x());
+    wrong.shift = draw(random, c.start_translation_sigma_m.x());
     wrong.start << draw(random, config.start_position_sigma_m), draw(random, config.start_rotation_sigma_rad);
     for (int i = 0; i < kSegments; ++i) wrong.offsets_m.push_back(draw(random, config.segments.sigma_m).x());
     const Found found = fly(wrong, config, 6, 200 + run);
@@ -371,8 +372,8 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
     worst = std::max(worst, error.cwiseQuotient(sigma).cwiseAbs().maxCoeff());
     // Both are learnt: the calibration to a part of what was known, the map but for its place as a whole.
     EXPECT_LT(found.calibration.time_sigma_s, 0.05 * c.start_time_sigma_s);
-    EXPECT_LT(found.calibration.turn_sigma_rad.maxCoeff(), 0.3 * c.start_rotation_sigma_rad);
-    EXPECT_LT(found.calibration.shift_sigma_m.maxCoeff(), 0.5 * c.start_translation_sigma_m);
+    EXPECT_LT(found.calibration.turn_sigma_rad.maxCoeff(), 0.3 * c.start_rotation_sigma_rad.x());
+    EXPECT_LT(found.calibration.shift_sigma_m.maxCoeff(), 0.5 * c.start_translation_sigma_m.x());
     EXPECT_LT(sigma.tail(kSegments).maxCoeff(), 0.8 * config.segments.sigma_m);
   }
   EXPECT_NEAR(nees, 1, 0.3);

@@ -35,9 +35,28 @@ void Ekf::update(const PoseInformation& measurement, std::span<const ContourOffs
   filter_.update(measurement_);
   if (offsets_) offsets_->apply_corrections(filter_);
   if (takes_contours()) share_of_blocks_ = filter_.share_of_blocks(measurement_);
+  apply_calibration();
+}
+
+void Ekf::update(const SeenMeasurement& measurement) {
+  measurement_.start({measurement.information.topLeftCorner<6, 6>(), measurement.vector.head<6>()},
+                     calibration_.pose_shifts(state()));
+  if (const auto numbers = calibration_.intrinsics())
+    measurement_.add_block(*numbers, measurement.information, measurement.vector);
+  filter_.update(measurement_);
+  if (offsets_) offsets_->apply_corrections(filter_);
+  apply_calibration();
+}
+
+void Ekf::apply_calibration() {
   Eigen::Vector3d gravity_map = propagator().gravity_map();
   calibration_.apply_corrections(filter_, &gravity_map);
   set_gravity_map(gravity_map);
+}
+
+Eigen::MatrixXd Ekf::seen_covariance() const {
+  const auto numbers = calibration_.intrinsics();
+  return filter_.seen_covariance(calibration_.pose_shifts(state()), numbers ? &*numbers : nullptr);
 }
 
 /// Adds what the contours say about the blocks that they depend on one by one.

@@ -24,6 +24,8 @@ class Ekf : public BackEnd {
   void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
+  void update(const SeenMeasurement& measurement) override;
+  Eigen::MatrixXd seen_covariance() const override;
   bool takes_contours() const override { return offsets_.has_value() || calibration_.takes_contours(); }
   const FusionState& state() const override { return filter_.state(); }
   Matrix6d measured_covariance() const override;
@@ -35,6 +37,7 @@ class Ekf : public BackEnd {
 
  private:
   void add_contours(std::span<const ContourOffset> contours);
+  void apply_calibration();
 
   ErrorStateFilter filter_;
   CalibrationStates calibration_;

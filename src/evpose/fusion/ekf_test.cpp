@@ -156,8 +156,47 @@ TEST(Ekf, EmptyMeasurementChangesNothing) {
   ekf.start(0, some_state(), {0, 0, 0});
   const Matrix15d before = ekf.state().covariance;
   EXPECT_EQ(innovation(ekf.state().pose_covariance(), {}), 0);
-  ekf.update({});
+  ekf.update(PoseInformation{});
   EXPECT_EQ(ekf.state().covariance, before);
+}
+
+/// Both ways of telling the filter what contours say of a camera with other numbers than given.
+TEST(Ekf, PoseAndNumbersMeasuredTogetherAreTheirContours) {
+  FusionConfig config;
+  config.calibration.intrinsics = true;
+  config.calibration.start_intrinsics_sigma = Eigen::VectorXd::LinSpaced(5, 0.01, 1);
+  const StatePropagator propagator(MotionModel::imu, config, ImuNoise{});
+  Ekf one_by_one(propagator, config), together(propagator, config);
+  one_by_one.start(0, some_state(), {0, 0, 0});
+  together.start(0, some_state(), {0, 0, 0});
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  PoseInformation pose;
+  SeenMeasurement all{Eigen::MatrixXd::Zero(11, 11), Eigen::VectorXd::Zero(11)};
+  std::vector<ContourOffset> contours;
+  for (int i = 0; i < 40; ++i) {
+    ContourOffset c;
+    c.point_body = {normal(random), normal(random), 4};
+    c.across_body = 300 * Eigen::Vector3d(normal(random), normal(random), 0).normalized();
+    c.offset_px = 0.01 * normal(random);
+    c.weight = 25;
+    c.by_intrinsics = Eigen::RowVectorXd::NullaryExpr(5, [&] { return normal(random); });
+    const Vector6d by_pose = c.by_pose(some_state().T_map_body.rotation());
+    Eigen::VectorXd row(11);
+    row << by_pose, c.by_intrinsics.transpose();
+    pose.information += c.weight * by_pose * by_pose.transpose();
+    pose.vector += c.weight * c.offset_px * by_pose;
+    all.information += c.weight * row * row.transpose();
+    all.vector += c.weight * c.offset_px * row;
+    contours.push_back(c);
+  }
+  one_by_one.update(pose, contours);
+  together.update(all);
+  EXPECT_LT(one_by_one.state().minus(together.state()).norm(), 1e-9);
+  const Eigen::MatrixXd P = one_by_one.filter().joint_covariance();
+  EXPECT_LT((together.filter().joint_covariance() - P).norm(), 1e-9 * P.norm());
+  EXPECT_LT((one_by_one.calibration().intrinsics - together.calibration().intrinsics).norm(), 1e-9);
+  EXPECT_GT(together.calibration().intrinsics.norm(), 0);
 }
 
 TEST(Ekf, ConstantVelocityLearnsTwistFromPosesAlone) {

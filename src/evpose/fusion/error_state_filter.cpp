@@ -196,6 +196,18 @@ Matrix6d ErrorStateFilter::seen_pose_covariance(std::span<const PoseShift> shift
   return P;
 }
 
+Eigen::MatrixXd ErrorStateFilter::seen_covariance(std::span<const PoseShift> shifts,
+                                                  const BlockId* block) const {
+  const int n = block == nullptr ? 0 : slot(*block).size, all = 15 + block_states();
+  Eigen::MatrixXd by_error = Eigen::MatrixXd::Zero(9 + n, all);
+  by_error.topLeftCorner<6, 6>().setIdentity();
+  for (const PoseShift& shift : shifts)
+    by_error.block(0, 15 + slot(shift.block).at, 6, shift.by_block.cols()) = shift.by_block;
+  by_error.block<3, 3>(6, error_state::kV).setIdentity();
+  if (block != nullptr) by_error.block(9, 15 + slot(*block).at, n, n).setIdentity();
+  return by_error * joint_covariance() * by_error.transpose();
+}
+
 Matrix6d ErrorStateFilter::share_of_blocks(const JointMeasurement& m) const {
   const Eigen::Index n = m.size() - 6;
   if (n == 0) return Matrix6d::Zero();

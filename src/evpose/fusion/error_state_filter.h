@@ -52,6 +52,8 @@ class ErrorStateFilter {
 
   /// Covariance of the error of the pose that is seen.
   Matrix6d seen_pose_covariance(std::span<const PoseShift> shifts) const;
+  /// The same jointly with the velocity and, if given, a block.
+  Eigen::MatrixXd seen_covariance(std::span<const PoseShift> shifts, const BlockId* block) const;
   /// Covariance that a pose told by this measurement alone has from the errors of the blocks that its samples
   /// depend on.
   Matrix6d share_of_blocks(const JointMeasurement& measurement) const;

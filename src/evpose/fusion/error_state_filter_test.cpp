@@ -275,6 +275,11 @@ TEST(ErrorStateFilter, TheSeenPoseIsAsUnsureAsPoseAndBlocksTogether) {
   const PoseShift other{mixed.sampled, C.middleCols(15 + mixed.filter.at(mixed.sampled), 2)};
   const std::vector<PoseShift> shifts{mixed.shift, other};
   EXPECT_LT(worst(mixed.filter.seen_pose_covariance(shifts), C * P * C.transpose()), 1e-12);
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(11, 21);
+  all.topRows<6>() = C;
+  all.block<3, 3>(6, error_state::kV).setIdentity();
+  all.block<2, 2>(9, 15 + mixed.filter.at(mixed.sampled)).setIdentity();
+  EXPECT_LT(worst(mixed.filter.seen_covariance(shifts, &mixed.sampled), all * P * all.transpose()), 1e-12);
 }
 
 // --- blocks that come and go ---

@@ -28,11 +28,8 @@ void describe(ConfigTable& table, FusionConfig& c) {
 }
 
 void describe(ConfigTable& table, CalibrationConfig& c) {
-  table.add("time_offset", c.time_offset, "estimate the time offset of the IMU against the camera (ekf)");
-  table.add("rotation", c.rotation, "estimate the rotation of the camera in the body (ekf)");
-  table.add("translation", c.translation, "estimate the place of the camera in the body (ekf)");
-  table.add("intrinsics", c.intrinsics,
-            "estimate focal lengths, principal point and distortion of the camera (ekf)");
+  table.add("on", c.on,
+            "estimate what is uncertain of the calibration: intrinsics, camera in the body, time offset (ekf)");
   table.add("gravity", c.gravity, "estimate the direction of gravity in the map (ekf)");
 }
 

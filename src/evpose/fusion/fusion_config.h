@@ -12,19 +12,20 @@ class ConfigTable;
 /// Framework that fuses prediction (EV-Pose eq. 2, 4) and pose measurements (eq. 3).
 enum class BackEndKind { ekf, graph, particle };
 
-/// Online calibration, by BackEndKind::ekf. The sigmas are those of an ordinary calibration.
+/// Online calibration, by BackEndKind::ekf. What has the sigma zero is known.
 struct CalibrationConfig {
+  bool on = true;        ///< what the tracker is told to be uncertain becomes states
+  bool gravity = false;  ///< direction of gravity in the map is a state: the map does not stand upright
+  // Filled in by the tracker from TrackerSetup::calibration_sigma: what is a state, and its sigma at the start.
   bool time_offset = false;  ///< of the IMU against the camera
   bool rotation = false;     ///< of the camera in the body
   bool translation = false;  ///< likewise
-  bool gravity = false;      ///< direction of gravity in the map: the map does not stand upright
   bool intrinsics = false;   ///< of the camera: focal lengths, principal point, distortion
   double start_time_sigma_s = 2e-3;
-  double start_rotation_sigma_rad = 5e-3;
-  double start_translation_sigma_m = 0.01;
-  double start_gravity_sigma_rad = 5e-3;  ///< about each horizontal axis
-
-  Eigen::VectorXd start_intrinsics_sigma;  ///< as AdjustedCamera orders them; the tracker fills it in
+  Eigen::Vector3d start_rotation_sigma_rad = Eigen::Vector3d::Constant(5e-3);
+  Eigen::Vector3d start_translation_sigma_m = Eigen::Vector3d::Constant(0.01);
+  Eigen::VectorXd start_intrinsics_sigma;  ///< as AdjustedCamera orders them
+  double start_gravity_sigma_rad = 5e-3;   ///< about each horizontal axis
 
   bool any() const { return time_offset || rotation || translation || gravity || intrinsics; }
 };

@@ -53,4 +53,15 @@ void JointMeasurement::add(const BlockSample& s) {
   }
 }
 
+void JointMeasurement::add_block(BlockId id, const Eigen::MatrixXd& information,
+                                 const Eigen::VectorXd& vector) {
+  const auto n = static_cast<int>(vector.size()) - 6;
+  const Block here = blocks_[static_cast<std::size_t>(place_of(id, n))];
+  EVPOSE_CHECK(here.size == n);
+  information_.block(0, here.at, 6, n) += information.topRightCorner(6, n);
+  information_.block(here.at, 0, n, 6) += information.bottomLeftCorner(n, 6);
+  information_.block(here.at, here.at, n, n) += information.bottomRightCorner(n, n);
+  vector_.segment(here.at, n) += vector.tail(n);
+}
+
 }  // namespace evpose

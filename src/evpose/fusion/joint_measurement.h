@@ -48,6 +48,10 @@ class JointMeasurement {
   /// share of the pose's vector is corrected for the difference of the two residuals.
   void add(const BlockSample& sample);
 
+  /// Adds what is known of one block together with the pose: information and vector of both, the pose first.
+  /// Its share of the pose's own is in there already.
+  void add_block(BlockId id, const Eigen::MatrixXd& information, const Eigen::VectorXd& vector);
+
   struct Block {
     BlockId id;
     int at, size;  ///< among the measured errors

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "evpose/io/calibration/kalibr.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/report/page.h"
@@ -194,6 +195,9 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
   if (Status done = write("summary.json", summary_json(s.log, summary, config, out.score, out.verdict));
       !done)
     return done.error();
+  if (summary.calibration)
+    if (Status done = write_kalibr_camera(s.file("calibration.yaml"), summary.calibration->found); !done)
+      return done.error();
   const std::string page = run_page({s.log, summary, config, out.score, s.overlays});
   if (Status done = write("report.html", page); !done) return done.error();
   if (Status done = s.move_into_place(); !done) return done.error();

@@ -146,6 +146,41 @@ std::string status_word(Health at_end) {
   return "lost";
 }
 
+/// Each number with the sigma that it was given with and has in the end.
+Json calibration_json(const RunCalibration& calibration) {
+  const auto entry = [](double given, double given_sigma, double found, double sigma) {
+    return Json{{"given", rounded(given)}, {"given_sigma", rounded(given_sigma)}, {"found", rounded(found)},
+                {"sigma", rounded(sigma)}};
+  };
+  const CalibratedCamera &a = calibration.given, &b = calibration.found;
+  const CameraIntrinsics &i = *a.intrinsics, &j = *b.intrinsics;
+  const Eigen::VectorXd before = a.sigma.of_intrinsics(i), after = b.sigma.of_intrinsics(j);
+  Json out;
+  out["fx_px"] = entry(i.fx, before(0), j.fx, after(0));
+  out["fy_px"] = entry(i.fy, before(1), j.fy, after(1));
+  out["cx_px"] = entry(i.cx, before(2), j.cx, after(2));
+  out["cy_px"] = entry(i.cy, before(3), j.cy, after(3));
+  out["distortion"] = Json::array();
+  for (std::size_t k = 0; k < i.distortion.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k) + 4;
+    out["distortion"].push_back(entry(i.distortion[k], before(at), j.distortion[k], after(at)));
+  }
+  if (!a.T_cam_imu || !b.T_cam_imu) return out;
+  const Pose given = a.T_cam_imu->inverse(), found = b.T_cam_imu->inverse();
+  const Eigen::Vector3d turn = so3::log(found.q * given.q.conjugate()) * 180 / M_PI;
+  const Eigen::Vector3d turn_before = a.sigma.of_rotation_rad() * 180 / M_PI,
+                        turn_after = b.sigma.of_rotation_rad() * 180 / M_PI,
+                        shift_before = a.sigma.of_translation_m(), shift_after = b.sigma.of_translation_m();
+  for (const int axis : {0, 1, 2}) {
+    const std::string name(1, static_cast<char>('x' + axis));
+    out["camera_turned_deg"][name] = entry(0, turn_before(axis), turn(axis), turn_after(axis));
+    out["camera_in_imu_m"][name] = entry(given.p(axis), shift_before(axis), found.p(axis), shift_after(axis));
+  }
+  out["timeshift_cam_imu_s"] =
+      entry(a.timeshift_cam_imu_s, a.sigma.of_time_s(), b.timeshift_cam_imu_s, b.sigma.of_time_s());
+  return out;
+}
+
 std::string score_json(const TrajectoryScore& score) {
   return dump({{"coverage", rounded(score.coverage)},
                {"accuracy", accuracy_json(score)},
@@ -168,6 +203,7 @@ std::string summary_json(const StateLog& log, const RunSummary& summary, const C
     out["accuracy"] = accuracy_json(*score);
     out["lost"] = lost_json(*score);
   }
+  if (summary.calibration) out["calibration"] = calibration_json(*summary.calibration);
   out["updates"] = log.rows.size();
   if (const auto latency = summarise_latency(log)) out["latency"] = latency_json(*latency);
   out["events"] = events_json(summary);

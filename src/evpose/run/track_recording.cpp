@@ -155,7 +155,8 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
                recording.has_imu ? MotionModel::imu : MotionModel::constant_velocity,
                recording.imu_noise,
                *map,
-               recording.camera};
+               recording.camera,
+               recording.calibration_sigma};
   job.start_words = start_words(request.init, !job.truth.empty());
   for (const auto& doubt : {doubt_map_size(**map), doubt_start_place(**map, start->T_map_body)})
     if (doubt) job.findings.push_back(*doubt);
@@ -185,6 +186,54 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   return job;
 }
 
+namespace {
+
+/// What the tracker was given of the calibration and knows of it in the end; none: it counted as known.
+std::optional<RunCalibration> calibration_of(const TrackJob& job, const Tracker& tracker) {
+  const Calibration found = tracker.calibration();
+  const Recording& recording = job.recording;
+  RunCalibration out;
+  CalibratedCamera& given = out.given;
+  given.name = "cam0";
+  given.intrinsics = recording.camera;
+  given.has_timeshift = recording.has_imu;
+  given.timeshift_cam_imu_s = recording.timeshift_cam_imu_s;
+  if (recording.has_imu) given.T_cam_imu = recording.T_cam_body;
+  const CalibrationSigma& stated = recording.calibration_sigma;
+  const Eigen::VectorXd numbers = stated.of_intrinsics(recording.camera);
+  const auto of_numbers = [](const Eigen::VectorXd& sigma, CalibrationSigma& to) {
+    to.intrinsics.emplace(sigma.begin(), sigma.begin() + 4);
+    to.distortion.emplace(sigma.begin() + 4, sigma.end());
+  };
+  of_numbers(numbers, given.sigma);
+  given.sigma.rotation_rad = stated.of_rotation_rad();
+  given.sigma.translation_m = stated.of_translation_m();
+  given.sigma.time_s = stated.of_time_s();
+  out.found = given;
+  CalibratedCamera& known = out.found;
+  if (found.intrinsics.size() > 0) {
+    CameraIntrinsics& c = *known.intrinsics;
+    c.fx += found.intrinsics(0), c.fy += found.intrinsics(1);
+    c.cx += found.intrinsics(2), c.cy += found.intrinsics(3);
+    for (std::size_t i = 0; i < c.distortion.size(); ++i)
+      c.distortion[i] += found.intrinsics(static_cast<Eigen::Index>(i) + 4);
+    of_numbers(found.intrinsics_sigma, known.sigma);
+  }
+  if (recording.has_imu) {
+    const Pose T_body_cam{found.turn * job.setup.T_body_cam.q, job.setup.T_body_cam.p + found.shift};
+    known.T_cam_imu = T_body_cam.inverse();
+    known.timeshift_cam_imu_s += found.time_offset_s;
+    known.sigma.rotation_rad = found.turn_sigma_rad;
+    known.sigma.translation_m = found.shift_sigma_m;
+    known.sigma.time_s = found.time_sigma_s;
+  }
+  const bool estimated = found.intrinsics.size() > 0 || found.time_sigma_s > 0 ||
+                         found.turn_sigma_rad.norm() > 0 || found.shift_sigma_m.norm() > 0;
+  return estimated ? std::optional(out) : std::nullopt;
+}
+
+}  // namespace
+
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker) {
   const Recording& recording = job.recording;
   const ContourMap& map = *job.map;
@@ -196,7 +245,10 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
                           "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
   summary.start = job.start_words;
   summary.findings = job.findings;
+  summary.calibration = calibration_of(job, tracker);
   summary.T_body_cam = job.setup.T_body_cam;
+  if (summary.calibration && summary.calibration->found.T_cam_imu)
+    summary.T_body_cam = summary.calibration->found.T_cam_imu->inverse();
   summary.truth = job.truth;
   const std::size_t step = map.points.size() / kDrawnMapPoints + 1;
   for (std::size_t i = 0; i < map.points.size(); i += step) summary.map_points.push_back(map.position(i));

@@ -13,7 +13,6 @@ namespace {
 constexpr std::array<double, 4> kGates_px{3, 1.5, 0.8, 0.5};
 constexpr int kStepsPerGate = 3;           // of Gauss-Newton, each with a new association
 constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band is wider than its gate
-constexpr double kInterval_s = 0.008;      // contours hardly turn in it
 constexpr std::size_t kIntervals = 5;      // looked at together: with fewer, velocity drifts from the truth
 constexpr double kPriorSigma_m = 0.02, kPriorSigma_rad = 0.01;  // of a hypothesis before it is refined
 constexpr double kPriorSigma_m_s = 0.3;                         // of its velocity, once that is known
@@ -44,28 +43,10 @@ HypothesisRefiner::HypothesisRefiner(const RelocalizerScene& scene, const Hypoth
       segments_(scene.segments),
       camera_(scene.camera),
       map_sigma_m_(scene.registration.map_sigma_m),
-      visible_(index_, camera_, points_to_refine(scene.visible)) {
+      visible_(index_, camera_, points_to_refine(scene.visible)),
+      intervals_(kIntervals) {
   for (const double gate_px : kGates_px)
     registrations_.emplace_back(camera_.size(), under_gate(scene.registration, gate_px), segments_.count);
-}
-
-void HypothesisRefiner::add_events(std::span<const FilteredEvent> events, std::uint32_t now_us,
-                                   const ImuIncrement& motion, const Eigen::Vector3d& angular_rate) {
-  if (intervals_.empty() || intervals_.back().motion.dt_s >= kInterval_s) {
-    if (intervals_.size() == kIntervals) {
-      intervals_.push_back(std::move(intervals_.front()));
-      intervals_.pop_front();
-      intervals_.back().events.clear();
-      intervals_.back().motion = {};
-    } else {
-      intervals_.emplace_back();
-    }
-  }
-  Interval& newest = intervals_.back();
-  newest.events.insert(newest.events.end(), events.begin(), events.end());
-  newest.now_us = now_us;
-  newest.motion = joined(newest.motion, motion);
-  newest.angular_rate = angular_rate;
 }
 
 void HypothesisRefiner::refine(PoseHypothesis& h, const Pose& T_body_cam, int slices) {
@@ -101,7 +82,7 @@ void HypothesisRefiner::add_intervals(Registration& registration, const ContourV
   NavState nav = h.nav;
   double age_s = 0, matched = 0, asked = 0;
   for (std::size_t k = 0; k < intervals; ++k) {
-    const Interval& interval = intervals_[intervals_.size() - 1 - k];
+    const EventInterval& interval = intervals_[k];
     const double span_s = interval.motion.dt_s;
     const BodyMotion body{nav.T_map_body, nav.velocity, motion_.angular_rate(h, interval.angular_rate)};
     project_contours(view, points, body, span_s, samples_);

@@ -8,11 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "evpose/imu/strapdown.h"
 #include "evpose/map/contour_segments.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/contour_view.h"
 #include "evpose/registration/event_registration.h"
+#include "evpose/tracker/event_intervals.h"
 #include "evpose/tracker/pose_hypothesis.h"
 
 namespace evpose {
@@ -37,9 +37,11 @@ class HypothesisRefiner {
 
   /// Leaves out the events of earlier searches.
   void clear_events() { intervals_.clear(); }
-  /// Events up to `now_us`, how the body has moved since those before, and its present rate.
+  /// As EventIntervals::add.
   void add_events(std::span<const FilteredEvent> events, std::uint32_t now_us, const ImuIncrement& motion,
-                  const Eigen::Vector3d& angular_rate);
+                  const Eigen::Vector3d& angular_rate) {
+    intervals_.add(events, now_us, motion, angular_rate);
+  }
 
   /// Refines `h` and measures its concentration and support. `slices`: seen since the search began, which
   /// tells how far back its motion is trusted and how well its velocity is known.
@@ -49,13 +51,6 @@ class HypothesisRefiner {
   using Vector9d = Eigen::Matrix<double, 9, 1>;
   using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
-  /// Some events one after another, up to now_us, and how the body moved meanwhile.
-  struct Interval {
-    std::vector<FilteredEvent> events;
-    std::uint32_t now_us = 0;
-    ImuIncrement motion;
-    Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
-  };
   /// Information about position, rotation and velocity.
   struct NormalEquations {
     Matrix9d H;
@@ -73,7 +68,7 @@ class HypothesisRefiner {
   double map_sigma_m_;
   VisibleSet visible_;
   std::deque<EventRegistration> registrations_;  ///< from a wide gate to the tracker's
-  std::deque<Interval> intervals_;               ///< the newest last
+  EventIntervals intervals_;
   std::vector<ContourSample> samples_;
 };
 

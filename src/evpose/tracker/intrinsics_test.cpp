@@ -8,6 +8,7 @@
 #include <random>
 
 #include "evpose/camera/adjusted_camera.h"
+#include "evpose/camera/calibration_sigma.h"
 #include "evpose/fusion/ekf.h"
 
 namespace evpose {
@@ -46,7 +47,7 @@ class Flight {
     camera_ = *AdjustedCamera::create(kGiven);
     FusionConfig config;
     config.calibration.intrinsics = true;
-    config.calibration.start_intrinsics_sigma = ordinary_intrinsics_sigma(kGiven);
+    config.calibration.start_intrinsics_sigma = CalibrationSigma{}.of_intrinsics(kGiven);
     AdjustedCamera::Correction error(kNumbers);
     for (Eigen::Index i = 0; i < kNumbers; ++i)
       error(i) = config.calibration.start_intrinsics_sigma(i) * normal_(random_);
@@ -140,7 +141,7 @@ TEST(Intrinsics, AreFoundWithThePoseUnderTheirStatedSigma) {
     Flight flight(300 + run);
     flight.fly(2);
     nees += flight.nees() / kRuns;
-    const Eigen::VectorXd start = ordinary_intrinsics_sigma(kGiven);
+    const Eigen::VectorXd start = CalibrationSigma{}.of_intrinsics(kGiven);
     const Eigen::VectorXd sigma = flight.ekf().calibration().intrinsics_sigma;
     for (Eigen::Index i = 0; i < kNumbers; ++i)
       EXPECT_LT(sigma(i), (i < 6 ? 0.1 : 0.3) * start(i)) << "number " << i;

@@ -66,6 +66,25 @@ Status check_start(const ContourMap& map, const StartState& start, double far_m)
   return {};
 }
 
+/// What is uncertain of the calibration becomes a state. Without an IMU body and camera are one.
+void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
+  CalibrationConfig& c = fusion.calibration;
+  c.time_offset = c.rotation = c.translation = c.intrinsics = false;
+  if (!c.on || !setup.calibration_sigma || fusion.kind != BackEndKind::ekf) return;
+  const CalibrationSigma& sigma = *setup.calibration_sigma;
+  c.start_time_sigma_s = sigma.of_time_s();
+  c.start_rotation_sigma_rad = sigma.of_rotation_rad();
+  c.start_translation_sigma_m = sigma.of_translation_m();
+  if (setup.motion == MotionModel::imu) {
+    c.time_offset = c.start_time_sigma_s > 0;
+    c.rotation = (c.start_rotation_sigma_rad.array() > 0).any();
+    c.translation = (c.start_translation_sigma_m.array() > 0).any();
+  }
+  if (!setup.intrinsics) return;
+  c.start_intrinsics_sigma = sigma.of_intrinsics(*setup.intrinsics);
+  c.intrinsics = (c.start_intrinsics_sigma.array() > 0).any();
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, const TrackerConfig& config,
@@ -79,17 +98,13 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   if (!fusion) return fusion.error();
   TrackerConfig resolved_config = config;
   resolved_config.fusion = *fusion;
-  CalibrationConfig& calibration = resolved_config.fusion.calibration;
-  if (!calibration.intrinsics)
+  choose_states(setup, resolved_config.fusion);
+  if (!resolved_config.fusion.calibration.intrinsics)
     return std::unique_ptr<Tracker>(new Tracker(setup, resolved_config, start, std::move(clock), nullptr));
-  if (!setup.intrinsics)
-    return Error{"fusion.calibration.intrinsics", "the camera's numbers are not known here",
-                 "give them in TrackerSetup::intrinsics"};
   auto adjusted = AdjustedCamera::create(*setup.intrinsics);
   if (!adjusted) return adjusted.error();
   TrackerSetup own = setup;
   own.camera = *adjusted;
-  calibration.start_intrinsics_sigma = ordinary_intrinsics_sigma(*setup.intrinsics);
   return std::unique_ptr<Tracker>(
       new Tracker(own, resolved_config, start, std::move(clock), std::move(*adjusted)));
 }
@@ -123,6 +138,11 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());
   supervisor_.start(fusion_->state(), uncertainty.sigma_px());
+  const CalibrationConfig& uncertain = config.fusion.calibration;
+  if (uncertain.intrinsics || uncertain.rotation || uncertain.translation)
+    start_alignment_.emplace(RelocalizerScene{index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
+                                              config.visible, config.event_registration},
+                             adjusted_.get());
   contours_.prepare(start.T_map_body);
 }
 
@@ -164,18 +184,21 @@ Update Tracker::update(TimeNs t) {
   reporter_.begin(input_.take_feeding_time_s());
   const double span_s = to_seconds(t - std::exchange(last_update_, t));
   const TimeNs from = fusion_->state().t, until = std::max(imu_time(t), from);
-  search_pose(t, imu_.predict(*fusion_, until));  // eq. (2), (4)
+  const ImuIncrement moved = imu_.predict(*fusion_, until);  // eq. (2), (4)
+  search_pose(t, moved);
   reporter_.end_stage(&StageTimes::predict_s);
   contours_.choose(fusion_->state(), span_s);  // EV-Pose 5.3
   reporter_.end_stage(&StageTimes::choose_s);
+  const bool aligning = align_start(t, moved);
   const RegistrationResult stpe =
-      supervisor_.searching() ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
+      supervisor_.searching() || aligning ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
   reporter_.end_stage(&StageTimes::register_s);
   const double innovation =
       evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
   // When the time offset found has fallen by more than an update, this update's time is past.
-  const std::string refused =
-      imu_time(t) < from ? "the time offset has changed" : supervisor_.refusal(t, stpe, innovation);
+  const std::string refused = imu_time(t) < from ? "the time offset has changed"
+                              : aligning         ? "aligning the first view"
+                                                 : supervisor_.refusal(t, stpe, innovation);
   if (refused.empty()) fuse(stpe);  // eq. (3), (5), (6)
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty());
@@ -194,6 +217,37 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   fusion_->start(*found);
   registration_->restart();
   imu_.restart_comparison();
+}
+
+/// While the first view of a camera whose calibration is uncertain is aligned, nothing else is measured. True: it
+/// was so in this update.
+bool Tracker::align_start(TimeNs t, const ImuIncrement& moved) {
+  if (!start_alignment_ || supervisor_.searching()) return false;
+  const FusionState& state = fusion_->state();
+  const SeenPrior prior{state.nav, fusion_->calibration().intrinsics, fusion_->seen_covariance()};
+  constexpr int kMostAlignments = 8;  // then the tracker's own gate has to do
+  const bool needed = start_alignment_->expected_offset_px(prior, contours_.samples(), T_body_cam_) >
+                      StartAlignment::kNeededAbove_px;
+  if (!needed || alignments_ == kMostAlignments) {
+    start_alignment_.reset();
+    return false;
+  }
+  start_alignment_->add_events(preprocessor_.kept(), preprocessor_.stamp(t), moved, state.angular_rate);
+  if (!start_alignment_->has_enough()) return true;
+  ++alignments_;
+  const auto measurement = start_alignment_->align(prior, T_body_cam_);
+  if (!measurement) return true;
+  fusion_->update(*measurement);
+  take_calibration();
+  start_alignment_.reset();
+  return true;
+}
+
+/// The camera becomes what the fusion has found it to be.
+void Tracker::take_calibration() {
+  const Calibration found = fusion_->calibration();
+  T_body_cam_ = {found.turn * setup_.T_body_cam.q, setup_.T_body_cam.p + found.shift};
+  if (adjusted_) adjusted_->set_correction(found.intrinsics);
 }
 
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
@@ -230,9 +284,7 @@ void Tracker::fuse(const RegistrationResult& measurement) {
   if (fusion_->takes_contours())
     for (const SampleOffset& offset : registration_->offsets()) offsets_.push_back(contour_offset(offset));
   fusion_->update({measurement.information, measurement.vector}, offsets_);
-  const Calibration found = fusion_->calibration();
-  T_body_cam_ = {found.turn * setup_.T_body_cam.q, setup_.T_body_cam.p + found.shift};
-  if (adjusted_) adjusted_->set_correction(found.intrinsics);
+  take_calibration();
 }
 
 void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement,

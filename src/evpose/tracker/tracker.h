@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "evpose/camera/adjusted_camera.h"
+#include "evpose/camera/calibration_sigma.h"
 #include "evpose/core/error.h"
 #include "evpose/map/contour_segments.h"
 #include "evpose/registration/registration.h"
@@ -17,6 +18,7 @@
 #include "evpose/tracker/input_queue.h"
 #include "evpose/tracker/pose_supervisor.h"
 #include "evpose/tracker/snapshot.h"
+#include "evpose/tracker/start_alignment.h"
 #include "evpose/tracker/tracker_config.h"
 #include "evpose/tracker/update.h"
 #include "evpose/tracker/update_reporter.h"
@@ -30,7 +32,9 @@ struct TrackerSetup {
   MotionModel motion = MotionModel::imu;
   ImuNoise imu_noise;
   std::shared_ptr<const ContourMap> map;
-  std::optional<CameraIntrinsics> intrinsics = {};  ///< of the camera, if they are to be estimated
+  std::optional<CameraIntrinsics> intrinsics = {};  ///< of the camera; without them they count as known
+  /// How wrong `camera` and T_body_cam and the time of the IMU may be; none: they are known.
+  std::optional<CalibrationSigma> calibration_sigma = {};
 };
 
 /// Where it starts.
@@ -93,6 +97,8 @@ class Tracker {
   // The stages of an update.
   Update update(TimeNs t);
   void search_pose(TimeNs t, const ImuIncrement& moved);
+  bool align_start(TimeNs t, const ImuIncrement& moved);
+  void take_calibration();
   RegistrationResult measure(TimeNs t, double span_s);
   ContourOffset contour_offset(const SampleOffset& offset) const;
   void fuse(const RegistrationResult& measurement);
@@ -112,6 +118,8 @@ class Tracker {
   std::unique_ptr<Registration> registration_;
   std::unique_ptr<BackEnd> fusion_;
   PoseSupervisor supervisor_;
+  std::optional<StartAlignment> start_alignment_;  ///< until it is done
+  int alignments_ = 0;                             ///< tried
   ImuRateOutput imu_rate_output_;
   UpdateReporter reporter_;
 

@@ -36,11 +36,11 @@ struct CalibrationOutcome {
 /// Makes the given calibration wrong and lets the tracker estimate what is wrong with it.
 void spoil(const CalibrationError& error, Streams& streams) {
   FusionConfig& fusion = streams.job.config.tracker.fusion;
-  fusion.calibration.start_time_sigma_s = kSpoiltTimeSigma_s;
-  fusion.calibration.start_rotation_sigma_rad = kSpoiltRotationSigma_rad;
-  fusion.calibration.time_offset = error.offset_s != 0 || !(error.turned() || error.shifted());
-  fusion.calibration.translation = error.shifted();
-  fusion.calibration.rotation = error.turned();
+  CalibrationSigma sigma = CalibrationSigma::known(*streams.job.setup.intrinsics);
+  if (error.offset_s != 0 || !(error.turned() || error.shifted())) sigma.time_s = kSpoiltTimeSigma_s;
+  if (error.shifted()) sigma.translation_m.reset();
+  if (error.turned()) sigma.rotation_rad = Eigen::Vector3d::Constant(kSpoiltRotationSigma_rad);
+  streams.job.setup.calibration_sigma = sigma;
   for (ImuSample& s : streams.imu) s.t += from_seconds(error.offset_s);
   Pose& given = streams.job.setup.T_body_cam;
   const Pose T_map_cam = streams.job.start.T_map_body * given;
@@ -49,7 +49,7 @@ void spoil(const CalibrationError& error, Streams& streams) {
   if (error.turned()) {
     // The start is where the camera was seen to be; the body's attitude is as wrong as the calibration.
     streams.job.start.T_map_body = T_map_cam * given.inverse();
-    fusion.start_rotation_sigma_rad = fusion.calibration.start_rotation_sigma_rad;
+    fusion.start_rotation_sigma_rad = kSpoiltRotationSigma_rad;
   }
   if (error.shifted()) {
     given.p -= 1e-3 * error.shift_mm;

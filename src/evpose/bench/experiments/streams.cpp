@@ -12,6 +12,7 @@ Expected<Streams> load_streams(const TrackRequest& request, const RunConfig& con
   if (!job) return job.error();
   Streams out;
   out.job = std::move(*job);
+  out.job.setup.calibration_sigma.reset();
   auto events = open_events(out.job.recording, 1e-3 * config.packet_ms);
   if (!events) return events.error();
   for (EventPacket packet;;) {
@@ -55,19 +56,20 @@ Excerpt excerpt(const Streams& streams, TimeNs begin, TimeNs end) {
   return out;
 }
 
+Pose true_pose(const std::vector<TimedPose>& truth, TimeNs t) {
+  const auto after = std::lower_bound(truth.begin() + 1, truth.end() - 1, t,
+                                      [](const TimedPose& p, TimeNs time) { return p.t < time; });
+  const auto before = after - 1;
+  return interpolate(before->pose, after->pose,
+                     static_cast<double>(t - before->t) / static_cast<double>(after->t - before->t));
+}
+
 StartState start_at(const std::vector<TimedPose>& truth, TimeNs t) {
-  const auto pose = [&](TimeNs at) {
-    const auto after = std::lower_bound(truth.begin() + 1, truth.end() - 1, at,
-                                        [](const TimedPose& p, TimeNs time) { return p.t < time; });
-    const auto before = after - 1;
-    return interpolate(before->pose, after->pose,
-                       static_cast<double>(at - before->t) / static_cast<double>(after->t - before->t));
-  };
   const TimeNs h = 5 * kNsPerMs;
-  const Pose a = pose(t - h), b = pose(t + h);
+  const Pose a = true_pose(truth, t - h), b = true_pose(truth, t + h);
   StartState out;
   out.t = t;
-  out.T_map_body = pose(t);
+  out.T_map_body = true_pose(truth, t);
   out.velocity = (b.p - a.p) / to_seconds(2 * h);
   out.angular_rate_body = so3::log(a.q.conjugate() * b.q) / to_seconds(2 * h);
   return out;

@@ -14,6 +14,7 @@ struct Streams {
   std::vector<EventPacket> packets;
   std::vector<ImuSample> imu;
 };
+/// The calibration counts as known: that of the recordings is the truth, and what is wrong with it, an experiment says.
 Expected<Streams> load_streams(const TrackRequest& request, const RunConfig& config);
 
 /// Feeds the packets and, ahead of each, the IMU samples that reach its end.
@@ -25,6 +26,9 @@ struct Excerpt {
   std::vector<ImuSample> imu;
 };
 Excerpt excerpt(const Streams& streams, TimeNs begin, TimeNs end);
+
+/// Interpolated; at least two poses.
+Pose true_pose(const std::vector<TimedPose>& truth, TimeNs t);
 
 /// The pose, velocity and rate that the truth has at a time inside it.
 StartState start_at(const std::vector<TimedPose>& truth, TimeNs t);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "evpose/camera/calibration_sigma.h"
 #include "evpose/camera/camera.h"
 #include "evpose/core/error.h"
 #include "evpose/core/pose.h"
@@ -23,6 +24,7 @@ struct CalibratedCamera {
   std::optional<Pose> T_cam_cam0;        ///< from the file's first camera
   bool has_timeshift = false;            ///< the file says something about it
   double timeshift_cam_imu_s = 0;        ///< t_imu = t_cam + timeshift
+  CalibrationSigma sigma;                ///< as far as the file states it
   int model_line = 1, numbers_line = 1;  ///< where model and intrinsics stand in the file
 };
 

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include "evpose/io/calibration/calibration_kinds.h"
 
 namespace evpose {
 namespace {
 
-constexpr double kLongestShift_s = 1e6;
+constexpr double kLongestShift_s = 1e6, kDegree = M_PI / 180;
 
 /// Kalibr's camera models: how many of their numbers stand before fu, fv, pu, pv.
 std::size_t leading_numbers(const std::string& model) {
@@ -79,6 +81,55 @@ Status read_shift(const YamlDocument& document, const YamlNode& node, Calibrated
   return {};
 }
 
+/// Numbers that are standard deviations; none if the key is not there.
+Expected<std::vector<double>> read_sigmas(const YamlDocument& document, const YamlNode& node, const char* key,
+                                          std::initializer_list<std::size_t> counts) {
+  const YamlNode* at = node.find(key);
+  if (at == nullptr) return std::vector<double>{};
+  auto values = document.numbers(*at, key);
+  if (!values) return values.error();
+  if (std::find(counts.begin(), counts.end(), values->size()) == counts.end())
+    return document.error(*at, text(key, ": ", values->size(), " numbers instead of ", *counts.begin()),
+                          "give one for each number, or leave the key out");
+  for (const double value : *values)
+    if (!(value >= 0) || !std::isfinite(value))
+      return document.error(*at, text(key, ": ", value, " is no standard deviation"),
+                            "give numbers from 0 on; 0 means known");
+  return values;
+}
+
+/// Keys of our own, beside Kalibr's.
+Status read_stated_sigma(const YamlDocument& document, const YamlNode& node, CalibratedCamera& out) {
+  const auto intrinsics = read_sigmas(document, node, "intrinsics_sigma", {4});
+  if (!intrinsics) return intrinsics.error();
+  if (!intrinsics->empty()) out.sigma.intrinsics = *intrinsics;
+  const std::size_t terms = out.intrinsics->distortion.size();
+  const auto distortion = read_sigmas(document, node, "distortion_sigma", {terms});
+  if (!distortion) return distortion.error();
+  if (!distortion->empty()) out.sigma.distortion = *distortion;
+  // Rotation in degrees, then translation in metres: one number each, or one for each axis.
+  const auto placement = read_sigmas(document, node, "T_cam_imu_sigma", {2, 6});
+  if (!placement) return placement.error();
+  if (!placement->empty()) {
+    const auto axes = [&](std::size_t part) -> Eigen::Vector3d {
+      const std::vector<double>& v = *placement;
+      if (v.size() == 2) return Eigen::Vector3d::Constant(v[part]);
+      return {v[3 * part], v[3 * part + 1], v[3 * part + 2]};
+    };
+    out.sigma.rotation_rad = kDegree * axes(0);
+    out.sigma.translation_m = axes(1);
+  }
+  const YamlNode* shift = node.find("timeshift_sigma");
+  if (shift == nullptr) return {};
+  const auto time = document.number(*shift, "timeshift_sigma");
+  if (!time) return time.error();
+  if (!(*time >= 0) || !std::isfinite(*time))
+    return document.error(*shift, text("timeshift_sigma: ", *time, " is no standard deviation"),
+                          "give seconds from 0 on; 0 means known");
+  out.sigma.time_s = *time;
+  return {};
+}
+
 /// Where a camera sits, by its own entries or through the camera before it.
 Status read_placement(const YamlDocument& document, const YamlNode& node, const CalibratedCamera* before,
                       CalibratedCamera& out) {
@@ -141,6 +192,7 @@ Expected<CalibrationFile> read_kalibr_chain(const YamlDocument& document) {
     camera.name = name;
     if (auto status = read_model(document, *node, camera); !status) return status.error();
     if (auto status = read_shift(document, *node, camera); !status) return status.error();
+    if (auto status = read_stated_sigma(document, *node, camera); !status) return status.error();
     if (i == 0) camera.T_cam_cam0 = Pose{};
     const CalibratedCamera* before = i == 0 ? nullptr : &out.cameras.back();
     if (auto status = read_placement(document, *node, before, camera); !status) return status.error();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 
 #include "evpose/io/files/atomic_file.h"
 
@@ -39,6 +40,14 @@ Status write_kalibr_camera(const std::string& path, const CalibratedCamera& came
     for (int r = 0; r < 4; ++r) out += "  - " + list({T(r, 0), T(r, 1), T(r, 2), T(r, 3)}) + "\n";
     out += "  timeshift_cam_imu: " + exact(camera.timeshift_cam_imu_s) + "\n";
   }
+  const CalibrationSigma& sigma = camera.sigma;
+  if (sigma.intrinsics) out += "  intrinsics_sigma: " + list(*sigma.intrinsics) + "\n";
+  if (sigma.distortion) out += "  distortion_sigma: " + list(*sigma.distortion) + "\n";
+  if (sigma.rotation_rad && sigma.translation_m) {
+    const Eigen::Vector3d turn = *sigma.rotation_rad * (180 / M_PI), &shift = *sigma.translation_m;
+    out += "  T_cam_imu_sigma: " + list({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()}) + "\n";
+  }
+  if (sigma.time_s) out += "  timeshift_sigma: " + exact(*sigma.time_s) + "\n";
   return write_text_file(path, out);
 }
 

@@ -12,7 +12,8 @@ namespace evpose {
 // Files as Kalibr writes them; read_calibration() reads them.
 
 /// As cam0. Without T_cam_imu neither it nor the shift is written. A camera without intrinsics is a fault of
-/// ours.
+/// ours. What is known of the errors stands beside Kalibr's keys: intrinsics_sigma (px), distortion_sigma,
+/// T_cam_imu_sigma (deg about, then m along each axis of the IMU), timeshift_sigma (s).
 Status write_kalibr_camera(const std::string& path, const CalibratedCamera& camera);
 
 /// The noise of any calibration file that has one. Errors name the line: missing or non-positive values, a

@@ -57,6 +57,43 @@ TEST(Kalibr, CameraIsReadAsWritten) {
   EXPECT_EQ(again->timeshift_cam_imu_s, camera->timeshift_cam_imu_s);
 }
 
+TEST(Kalibr, WhatIsStatedOfTheErrorsIsReadAsWritten) {
+  const TemporaryFolder folder;
+  const auto plain = read_camera(folder.file("plain.yaml", kCamera));
+  ASSERT_TRUE(plain.ok());
+  EXPECT_FALSE(plain->sigma.intrinsics || plain->sigma.distortion || plain->sigma.rotation_rad ||
+               plain->sigma.translation_m || plain->sigma.time_s);
+
+  const auto one_each = read_camera(folder.file("one.yaml", kCamera + "  T_cam_imu_sigma: [0.18, 0.004]\n"));
+  ASSERT_TRUE(one_each.ok()) << error_line(one_each);
+  EXPECT_TRUE(one_each->sigma.rotation_rad->isApprox(Eigen::Vector3d::Constant(0.18 * M_PI / 180)));
+  EXPECT_EQ(*one_each->sigma.translation_m, Eigen::Vector3d::Constant(0.004));
+  EXPECT_FALSE(one_each->sigma.intrinsics || one_each->sigma.time_s) << "stated in part";
+
+  CalibratedCamera camera = *plain;
+  camera.sigma = {std::vector<double>{1, 2, 0.5, 0}, std::vector<double>{0.01, 0.02, 0, 1e-4},
+                  Eigen::Vector3d(1e-3, 2e-3, 0), Eigen::Vector3d(0, 0.002, 0.003), 5e-4};
+  ASSERT_TRUE(write_kalibr_camera(folder / "all.yaml", camera).ok());
+  const auto all = read_camera(folder / "all.yaml");
+  ASSERT_TRUE(all.ok()) << error_line(all);
+  EXPECT_EQ(*all->sigma.intrinsics, *camera.sigma.intrinsics);
+  EXPECT_EQ(*all->sigma.distortion, *camera.sigma.distortion);
+  EXPECT_TRUE(all->sigma.rotation_rad->isApprox(*camera.sigma.rotation_rad));
+  EXPECT_EQ(*all->sigma.translation_m, *camera.sigma.translation_m);
+  EXPECT_EQ(*all->sigma.time_s, 5e-4);
+}
+
+TEST(Kalibr, SigmasThatAreNoneNameTheLine) {
+  const TemporaryFolder folder;
+  for (const char* line : {"intrinsics_sigma: [1, 1, 1]", "intrinsics_sigma: [1, 1, -1, 1]",
+                           "distortion_sigma: [0.1]", "distortion_sigma: [0.1, .nan, 0.1, 0.1]",
+                           "T_cam_imu_sigma: [0.1, 0.1, 0.1]", "timeshift_sigma: -0.001"}) {
+    const auto camera = read_camera(folder.file("c.yaml", kCamera + "  " + line + "\n"));
+    ASSERT_FALSE(camera.ok()) << line;
+    EXPECT_NE(camera.error().line().find("c.yaml:13"), std::string::npos) << camera.error().line();
+  }
+}
+
 TEST(Kalibr, ExtrinsicsRunAlongTheChain) {
   const TemporaryFolder folder;
   const std::string second =

@@ -80,13 +80,14 @@ Expected<CalibratedCamera> read_camera(const Recording& r, const RecordingOverri
   return choose_camera(*calibration, files.camera_index);
 }
 
-Status take_calibration(const FoundRecording& found, Recording& r, double& timeshift_s) {
+Status take_calibration(const FoundRecording& found, Recording& r) {
   std::optional<ImuNoise> noise = found.imu_noise;
   auto camera = found.camera ? Expected<CalibratedCamera>(*found.camera) : read_camera(r, found.files, noise);
   if (!camera) return camera.error();
   r.camera = *camera->intrinsics;
+  r.calibration_sigma = camera->sigma;
   r.T_cam_body = camera->T_cam_imu.value_or(Pose{});
-  timeshift_s = camera->timeshift_cam_imu_s;
+  r.timeshift_cam_imu_s = camera->timeshift_cam_imu_s;
   if (!r.has_imu) return {};
   if (!camera->T_cam_imu)
     return Error{r.calibration_path, text("no T_cam_imu for ", camera->name, ", but there is an IMU"),
@@ -141,10 +142,10 @@ Status take_groundtruth(const RecordingOverrides& overrides, const std::string& 
   return {};
 }
 
-void take_options(const RecordingOverrides& overrides, double timeshift_s, Recording& r) {
+void take_options(const RecordingOverrides& overrides, Recording& r) {
   r.events_format = overrides.events_format;
   r.event_options = overrides.event_options;
-  r.event_options.offset_ns = from_seconds(timeshift_s) + to_ns(overrides.offset_events_s);
+  r.event_options.offset_ns = from_seconds(r.timeshift_cam_imu_s) + to_ns(overrides.offset_events_s);
   if (overrides.t_start_s)
     r.event_options.t_start_ns = r.imu_options.t_start_ns = from_seconds(*overrides.t_start_s);
   if (overrides.t_end_s) r.event_options.t_end_ns = r.imu_options.t_end_ns = from_seconds(*overrides.t_end_s);
@@ -261,11 +262,10 @@ Expected<Recording> open_recording(const std::string& path, const std::string& c
     found->imu_noise.reset();
   }
   if (auto status = check_files(r); !status) return status.error();
-  double timeshift_s = 0;
-  if (auto status = take_calibration(*found, r, timeshift_s); !status) return status.error();
+  if (auto status = take_calibration(*found, r); !status) return status.error();
   if (auto status = take_groundtruth(found->files, yaml, r); !status) return status.error();
   if (auto status = take_imu(found->files, r); !status) return status.error();
-  take_options(found->files, timeshift_s, r);
+  take_options(found->files, r);
   if (auto status = probe_events(r); !status) return status.error();
   if (auto status = crop(yaml, r); !status) return status.error();
   if (r.has_imu) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "evpose/camera/calibration_sigma.h"
 #include "evpose/camera/camera.h"
 #include "evpose/core/error.h"
 #include "evpose/core/pose.h"
@@ -31,6 +32,8 @@ struct Recording {
   std::vector<Error> missing;  ///< what could not be found, and where to put it; it works without
 
   CameraIntrinsics camera;
+  CalibrationSigma calibration_sigma;  ///< of camera, T_cam_body and the IMU's time
+  double timeshift_cam_imu_s = 0;      ///< t_imu = t_cam + timeshift; the events' times already have it
   Pose T_cam_body;  ///< identity when there is no IMU and the calibration has no extrinsics: body = camera
   bool has_imu = false;
   ImuNoise imu_noise;

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <string>
 
+#include "evpose/camera/calibration_sigma.h"
+
 namespace evpose {
 class ConfigTable;
 struct CalibratedCamera;
@@ -43,6 +45,9 @@ struct CalibrationErrors {
   bool none() const;
 };
 CalibrationErrors draw_calibration_errors(const HandedOverConfig& config, std::uint64_t seed);
+
+/// What a file states that holds a drawn calibration of this camera.
+CalibrationSigma stated_sigma(const HandedOverConfig& config, const CameraIntrinsics& camera);
 
 /// A radial-tangential camera with T_cam_imu.
 CalibratedCamera with_errors(const CalibratedCamera& truth, const CalibrationErrors& errors);

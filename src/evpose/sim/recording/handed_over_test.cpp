@@ -58,6 +58,31 @@ TEST(HandedOver, DrawsHaveTheStatedSigmasAndAreIndependent) {
           << i << " " << j;
 }
 
+TEST(HandedOver, TheFileStatesTheSpreadOfItsErrors) {
+  constexpr int kSeeds = 2000;
+  HandedOverConfig config;
+  config.preset = CalibrationQuality::ordinary;
+  const CalibratedCamera truth = camera();
+  const CalibrationSigma stated = stated_sigma(config, *truth.intrinsics);
+  const Eigen::VectorXd of_numbers = stated.of_intrinsics(*truth.intrinsics);
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(of_numbers.size() + 7);
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const CalibratedCamera wrong = with_errors(truth, draw_calibration_errors(config, static_cast<std::uint64_t>(seed)));
+    const CameraIntrinsics &a = *truth.intrinsics, &b = *wrong.intrinsics;
+    Eigen::VectorXd z(sums.size());
+    z.head<4>() << b.fx - a.fx, b.fy - a.fy, b.cx - a.cx, b.cy - a.cy;
+    for (std::size_t i = 0; i < 4; ++i) z(static_cast<Eigen::Index>(i) + 4) = b.distortion[i] - a.distortion[i];
+    z.head<8>().array() /= of_numbers.array();
+    const Pose given = wrong.T_cam_imu->inverse(), is = truth.T_cam_imu->inverse();
+    z.segment<3>(8) = so3::log(given.q * is.q.conjugate()).cwiseQuotient(*stated.rotation_rad);
+    z.segment<3>(11) = (given.p - is.p).cwiseQuotient(*stated.translation_m);
+    z(14) = (wrong.timeshift_cam_imu_s - truth.timeshift_cam_imu_s) / *stated.time_s;
+    sums += z.cwiseAbs2() / kSeeds;
+  }
+  for (const double mean_square : sums) EXPECT_NEAR(mean_square, 1, 4.5 * std::sqrt(2.0 / kSeeds));
+  EXPECT_EQ(stated_sigma({}, *truth.intrinsics).of_intrinsics(*truth.intrinsics).norm(), 0) << "known";
+}
+
 TEST(HandedOver, TheSeedSelectsAndTruthIsNoError) {
   EXPECT_EQ(ordinary_draw(4), ordinary_draw(4));
   EXPECT_NE(ordinary_draw(4), ordinary_draw(5));

@@ -127,7 +127,7 @@ class RecordingMaker {
  private:
   Status write_motion_and_calibration(const Trajectory& trajectory);
   /// With the errors of `handed_over`, and the truth beside it.
-  Status write_calibration(const CalibratedCamera& truth) const;
+  Status write_calibration(CalibratedCamera truth) const;
   Status write_map(const Scene& scene, const RayCaster& rays);
   Status expose(const PreparedScene& prepared, const Camera& camera, const std::vector<PixelRay>& rays,
                 const CameraPath& path);
@@ -172,12 +172,14 @@ Status RecordingMaker::write_motion_and_calibration(const Trajectory& trajectory
                                                              static_cast<std::uint64_t>(scenario_.seed)));
 }
 
-Status RecordingMaker::write_calibration(const CalibratedCamera& truth) const {
+Status RecordingMaker::write_calibration(CalibratedCamera truth) const {
+  truth.sigma = CalibrationSigma::known(*truth.intrinsics);
   const std::string handed_over = folder_.path("camchain-imucam.yaml");
   const CalibrationErrors errors =
       draw_calibration_errors(scenario_.handed_over, static_cast<std::uint64_t>(scenario_.seed));
   if (errors.none()) return write_kalibr_camera(handed_over, truth);
-  const CalibratedCamera wrong = with_errors(truth, errors);
+  CalibratedCamera wrong = with_errors(truth, errors);
+  wrong.sigma = stated_sigma(scenario_.handed_over, *truth.intrinsics);
   if (const auto camera = make_camera(*wrong.intrinsics); !camera)
     return Error{"handed_over", "the drawn errors make no camera", "take smaller sigmas or another seed"};
   if (Status done = write_text_file(folder_.path("handed_over.yaml"), to_yaml(errors)); !done) return done;

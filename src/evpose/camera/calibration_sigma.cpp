@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/camera/calibration_sigma.h"
+
+#include <algorithm>
+
+namespace evpose {
+namespace {
+
+/// Of an ordinary calibration; the focal lengths' are relative.
+constexpr double kFocal = 3e-3, kCentre_px = 1, kFirstRadial = 0.01, kRadial = 0.02, kTangential = 5e-4;
+
+Eigen::VectorXd ordinary(const CameraIntrinsics& c) {
+  Eigen::VectorXd sigma(4 + static_cast<Eigen::Index>(c.distortion.size()));
+  sigma.head<4>() << kFocal * c.fx, kFocal * c.fy, kCentre_px, kCentre_px;
+  for (Eigen::Index i = 4; i < sigma.size(); ++i) sigma(i) = i == 4 ? kFirstRadial : kRadial;
+  if (c.distortion_model == "radtan") sigma.segment<2>(6).setConstant(kTangential);
+  if (c.distortion_model == "ds") sigma.tail<2>().setConstant(kFirstRadial);
+  return sigma;
+}
+
+}  // namespace
+
+CalibrationSigma CalibrationSigma::known(const CameraIntrinsics& c) {
+  return {std::vector<double>(4), std::vector<double>(c.distortion.size()), Eigen::Vector3d::Zero(),
+          Eigen::Vector3d::Zero(), 0};
+}
+
+Eigen::VectorXd CalibrationSigma::of_intrinsics(const CameraIntrinsics& c) const {
+  Eigen::VectorXd sigma = ordinary(c);
+  if (intrinsics && intrinsics->size() == 4) std::copy(intrinsics->begin(), intrinsics->end(), sigma.begin());
+  if (distortion && distortion->size() == c.distortion.size())
+    std::copy(distortion->begin(), distortion->end(), sigma.begin() + 4);
+  return sigma;
+}
+
+}  // namespace evpose

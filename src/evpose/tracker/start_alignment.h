@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "evpose/camera/adjusted_camera.h"
+#include "evpose/fusion/back_end.h"
+#include "evpose/registration/event_registration.h"
+#include "evpose/tracker/event_intervals.h"
+#include "evpose/tracker/hypothesis_refiner.h"
+
+namespace evpose {
+
+/// What is known of the camera's view before it has told anything.
+struct SeenPrior {
+  NavState nav;                            ///< pose as it is seen: the body's, were the given T_body_cam true
+  AdjustedCamera::Correction numbers;      ///< of the camera, present correction; empty: they are known
+  Eigen::MatrixXd covariance;              ///< of pose (as Pose::plus), velocity, numbers
+};
+
+/// Aligns the first view of a camera whose calibration is uncertain. Contours then lie up to several pixels from
+/// where they are expected, further than the tracker's gate reaches, and not all by the same motion: an error of the
+/// focal length moves the rim alone. So the events of the first moments are looked at again and again, at their own
+/// times and under gates that close from several pixels to the tracker's (graduated non-convexity), for the pose, the
+/// velocity and the camera's numbers together. This begins at several poses (search_pose()), once with the numbers
+/// free and once with the pose alone at first; what gathers most events at the contours is taken. Errors that the
+/// events of one edge share are eliminated with a variance of their own for each edge (Student-t), so that the
+/// covariance is one that single disturbed edges do not mislead.
+class StartAlignment {
+ public:
+  /// Worth its time where contours are expected to lie further off than this, px (root mean square).
+  static constexpr double kNeededAbove_px = 1;
+
+  /// `camera`: if its numbers are estimated, the scene's camera; else null. References are kept.
+  StartAlignment(const RelocalizerScene& scene, AdjustedCamera* camera);
+
+  /// How far these contours may lie off, root mean square, px.
+  double expected_offset_px(const SeenPrior& prior, std::span<const ContourSample> samples,
+                            const Pose& T_body_cam) const;
+
+  /// As EventIntervals::add.
+  void add_events(std::span<const FilteredEvent> events, std::uint32_t now_us, const ImuIncrement& motion,
+                  const Eigen::Vector3d& angular_rate) {
+    intervals_.add(events, now_us, motion, angular_rate);
+  }
+  bool has_enough() const { return intervals_.duration_s() >= kDuration_s; }
+  /// What the events added so far say of pose and numbers about the prior's mean. None: no view was found at which
+  /// they gather at the contours; other events are then waited for. Changes the camera's correction.
+  std::optional<SeenMeasurement> align(const SeenPrior& prior, const Pose& T_body_cam);
+
+ private:
+  static constexpr double kDuration_s = 0.04;
+
+  /// One begin of the iteration, and where it led.
+  struct Trial {
+    NavState nav;
+    AdjustedCamera::Correction numbers;
+    Eigen::MatrixXd H;      ///< information about (pose, velocity, numbers) at the end
+    Eigen::VectorXd b;      ///< its vector
+    Eigen::VectorXd moved;  ///< from the prior's mean
+    double concentration = 0, support = 0;
+    std::map<std::uint32_t, double> edge_variances;  ///< px^2, by edge
+  };
+  /// Sums of one edge over samples and intervals.
+  struct EdgeSum {
+    Eigen::VectorXd row;
+    double weight = 0, offset = 0;
+  };
+  std::vector<Pose> first_guesses(const SeenPrior& prior, const Pose& T_body_cam) const;
+  Trial anneal(const SeenPrior& prior, const Pose& from, const Pose& T_body_cam, double numbers_below_px);
+  void look(const SeenPrior& prior, const Pose& T_body_cam, std::span<const std::uint32_t> points,
+            EventRegistration& registration, Trial& trial);
+  void add_offsets(const EventRegistration& registration, const Pose& T_cam_map,
+                   const Eigen::Matrix<double, 6, 9>& by_state, std::map<std::uint32_t, EdgeSum>& edges,
+                   Trial& trial) const;
+  void add_edges(const std::map<std::uint32_t, EdgeSum>& edges, Trial& trial) const;
+  SeenMeasurement without_velocity(const SeenPrior& prior, const Trial& trial) const;
+
+  HypothesisMotion motion_;
+  const ContourIndex& index_;
+  const ContourSegments& segments_;
+  const Camera& camera_;
+  AdjustedCamera* adjusted_;
+  VisibleSetConfig visible_config_;
+  EventRegistrationConfig registration_config_;
+  ContourSegments edges_;
+  std::vector<std::int8_t> side_;  ///< of each map point: +1 or -1, which way an error of its edge counts
+  EventIntervals intervals_;
+  std::vector<ContourSample> samples_;
+};
+
+}  // namespace evpose

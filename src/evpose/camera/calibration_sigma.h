@@ -21,8 +21,8 @@ struct CalibrationSigma {
   /// All zero.
   static CalibrationSigma known(const CameraIntrinsics& intrinsics);
 
-  /// In the order of AdjustedCamera. Without a statement: focal length 0.3 %, centre 1 px, k1 0.01, further ones
-  /// 0.02, p1 and p2 0.0005.
+  /// In the order of AdjustedCamera. Without a statement: focal length 0.3 %, centre 1 px, k1 0.01, further
+  /// ones 0.02, p1 and p2 0.0005.
   Eigen::VectorXd of_intrinsics(const CameraIntrinsics& camera) const;
   Eigen::Vector3d of_rotation_rad() const { return rotation_rad.value_or(Eigen::Vector3d::Constant(5e-3)); }
   Eigen::Vector3d of_translation_m() const { return translation_m.value_or(Eigen::Vector3d::Constant(0.01)); }

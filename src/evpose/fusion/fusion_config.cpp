@@ -28,8 +28,9 @@ void describe(ConfigTable& table, FusionConfig& c) {
 }
 
 void describe(ConfigTable& table, CalibrationConfig& c) {
-  table.add("on", c.on,
-            "estimate what is uncertain of the calibration: intrinsics, camera in the body, time offset (ekf)");
+  table.add(
+      "on", c.on,
+      "estimate what is uncertain of the calibration: intrinsics, camera in the body, time offset (ekf)");
   table.add("gravity", c.gravity, "estimate the direction of gravity in the map (ekf)");
 }
 

@@ -16,7 +16,8 @@ enum class BackEndKind { ekf, graph, particle };
 struct CalibrationConfig {
   bool on = true;        ///< what the tracker is told to be uncertain becomes states
   bool gravity = false;  ///< direction of gravity in the map is a state: the map does not stand upright
-  // Filled in by the tracker from TrackerSetup::calibration_sigma: what is a state, and its sigma at the start.
+  // Filled in by the tracker from TrackerSetup::calibration_sigma: what is a state, and its sigma at the
+  // start.
   bool time_offset = false;  ///< of the IMU against the camera
   bool rotation = false;     ///< of the camera in the body
   bool translation = false;  ///< likewise

@@ -21,23 +21,23 @@ namespace evpose {
 
 struct FusionState;
 
-/// A calibration that the tracker has estimated: as it was given, and as it was known at the end. Both state their
-/// sigmas.
+/// A calibration that the tracker has estimated: as it was given, and as it was known at the end. Both state
+/// their sigmas.
 struct RunCalibration {
   CalibratedCamera given, found;
 };
 
 /// What a run folder is told at the end, beside the updates.
 struct RunSummary {
-  std::string title;            ///< of the report, e.g. the recording's name
-  std::string subtitle;         ///< e.g. the map's name and how the run was started
-  std::string start;            ///< where the start pose came from: "started from ground truth"
-  std::vector<Error> findings;  ///< what looked wrong with the input before the run
-  bool interrupted = false;     ///< before the recording's end
+  std::string title;                          ///< of the report, e.g. the recording's name
+  std::string subtitle;                       ///< e.g. the map's name and how the run was started
+  std::string start;                          ///< where the start pose came from: "started from ground truth"
+  std::vector<Error> findings;                ///< what looked wrong with the input before the run
+  bool interrupted = false;                   ///< before the recording's end
   Pose T_body_cam;                            ///< as known at the end
   std::optional<RunCalibration> calibration;  ///< if any of it was estimated
-  std::vector<TimedPose> truth;             ///< T_map_body; empty where not known
-  std::vector<Eigen::Vector3d> map_points;  ///< map frame, metres; drawn, thinned out
+  std::vector<TimedPose> truth;               ///< T_map_body; empty where not known
+  std::vector<Eigen::Vector3d> map_points;    ///< map frame, metres; drawn, thinned out
   std::uint64_t events_read = 0, events_kept = 0, events_shed = 0;
   std::vector<std::pair<int, int>> hot_pixels;  ///< x, y
   double wall_s = 0;                            ///< wall time of reading and tracking
@@ -55,10 +55,10 @@ struct RunOutcome {
 };
 
 /// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, if wanted states_imu.csv,
-/// latency.csv, summary.json, config.yaml, report.html and, if it was estimated, calibration.yaml. It is made under a temporary name beside its place
-/// and moved there when all is written, so that nothing is changed by a run that fails. The same estimates
-/// give the same bytes, but for what depends on wall time: latency.csv, report.html, and "latency",
-/// "resources" and "rate_mev_s" in summary.json.
+/// latency.csv, summary.json, config.yaml, report.html and, if it was estimated, calibration.yaml. It is made
+/// under a temporary name beside its place and moved there when all is written, so that nothing is changed by
+/// a run that fails. The same estimates give the same bytes, but for what depends on wall time: latency.csv,
+/// report.html, and "latency", "resources" and "rate_mev_s" in summary.json.
 class RunFolder {
  public:
   /// `replace`: an earlier run that stands there, once this one is finished. Errors: the place's parent does

@@ -149,7 +149,9 @@ std::string status_word(Health at_end) {
 /// Each number with the sigma that it was given with and has in the end.
 Json calibration_json(const RunCalibration& calibration) {
   const auto entry = [](double given, double given_sigma, double found, double sigma) {
-    return Json{{"given", rounded(given)}, {"given_sigma", rounded(given_sigma)}, {"found", rounded(found)},
+    return Json{{"given", rounded(given)},
+                {"given_sigma", rounded(given_sigma)},
+                {"found", rounded(found)},
                 {"sigma", rounded(sigma)}};
   };
   const CalibratedCamera &a = calibration.given, &b = calibration.found;

@@ -15,22 +15,22 @@ namespace {
 
 // From the errors of an ordinary calibration to the gate of the tracker.
 constexpr std::array<double, 7> kGates_px{4, 3, 2, 1.4, 1, 0.7, 0.5};
-constexpr int kStepsPerGate = 4;            // of Gauss-Newton, each with a new association
-constexpr double kScatterOfGate = 0.7;      // sigma of the events under a gate, but for the tracker's
-constexpr double kContrastReach_px = 0.1;   // below every gate, so that no band is wider than its gate
-constexpr double kNumbersFirst_px = 10;     // gates below which the camera's numbers are free: all,
-constexpr double kPoseFirst_px = 1.7;       // or the narrow ones
-constexpr double kHeld = 1e12;              // factor on the prior's information that holds the numbers
+constexpr int kStepsPerGate = 4;           // of Gauss-Newton, each with a new association
+constexpr double kScatterOfGate = 0.7;     // sigma of the events under a gate, but for the tracker's
+constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band is wider than its gate
+constexpr double kNumbersFirst_px = 10;    // gates below which the camera's numbers are free: all,
+constexpr double kPoseFirst_px = 1.7;      // or the narrow ones
+constexpr double kHeld = 1e12;             // factor on the prior's information that holds the numbers
 constexpr double kLeastConcentration = 0.38;
-constexpr double kEdge_m = 0.6;             // an edge whose events share errors
-constexpr double kEdgeSigma_px = 0.15;      // of such an error; one degree of freedom
+constexpr double kEdge_m = 0.6;         // an edge whose events share errors
+constexpr double kEdgeSigma_px = 0.15;  // of such an error; one degree of freedom
 
 // Points to refine with, and to search with.
 constexpr double kPointStride_px = 4, kSearchStride_px = 8, kSearchMargin_px = 40;
 constexpr int kPoints = 3000, kSearchPoints = 700;
-constexpr std::size_t kSearched = 4;        // poses that are tried beside the prior's
+constexpr std::size_t kSearched = 4;  // poses that are tried beside the prior's
 constexpr std::size_t kSearchEvents = 20000;
-constexpr double kSearchSpan_s = 0.02;      // contours move little in it
+constexpr double kSearchSpan_s = 0.02;  // contours move little in it
 
 VisibleSetConfig points_to_refine(VisibleSetConfig config) {
   config.stride_px = kPointStride_px;
@@ -104,7 +104,8 @@ std::vector<Pose> StartAlignment::first_guesses(const SeenPrior& prior, const Po
   std::vector<Pose> out{prior.nav.T_map_body};
   std::vector<FilteredEvent> events, compensated;
   double span_s = 0;
-  for (std::size_t k = 0; k < intervals_.size() && events.size() < kSearchEvents && span_s < kSearchSpan_s; ++k) {
+  for (std::size_t k = 0; k < intervals_.size() && events.size() < kSearchEvents && span_s < kSearchSpan_s;
+       ++k) {
     events.insert(events.begin(), intervals_[k].events.begin(), intervals_[k].events.end());
     span_s += intervals_[k].motion.dt_s;
   }
@@ -131,8 +132,8 @@ std::vector<Pose> StartAlignment::first_guesses(const SeenPrior& prior, const Po
   return out;
 }
 
-/// Adds what the events of one look say, with the trial's own rows: by_state is the derivative of the pose at the
-/// events' time by the newest pose and velocity.
+/// Adds what the events of one look say, with the trial's own rows: by_state is the derivative of the pose at
+/// the events' time by the newest pose and velocity.
 void StartAlignment::add_offsets(const EventRegistration& registration, const Pose& T_cam_map,
                                  const Eigen::Matrix<double, 6, 9>& by_state,
                                  std::map<std::uint32_t, EdgeSum>& edges, Trial& trial) const {
@@ -171,8 +172,9 @@ void StartAlignment::add_edges(const std::map<std::uint32_t, EdgeSum>& edges, Tr
 }
 
 /// Looks at all events from the trial's state.
-void StartAlignment::look(const SeenPrior& prior, const Pose& T_body_cam, std::span<const std::uint32_t> points,
-                          EventRegistration& registration, Trial& trial) {
+void StartAlignment::look(const SeenPrior& prior, const Pose& T_body_cam,
+                          std::span<const std::uint32_t> points, EventRegistration& registration,
+                          Trial& trial) {
   const ContourView view{index_.map(), segments_, camera_, T_body_cam, registration_config_.map_sigma_m};
   if (adjusted_ != nullptr) adjusted_->set_correction(trial.numbers);
   trial.moved << trial.nav.T_map_body.minus(prior.nav.T_map_body), trial.nav.velocity - prior.nav.velocity,
@@ -221,7 +223,8 @@ StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Pose&
   VisibleSet visible(index_, choosing, points_to_refine(visible_config_));
   const std::vector<std::uint32_t> points = visible.choose(from * T_body_cam);
   for (const double gate_px : kGates_px) {
-    EventRegistration registration(camera_.size(), under_gate(registration_config_, gate_px), segments_.count);
+    EventRegistration registration(camera_.size(), under_gate(registration_config_, gate_px),
+                                   segments_.count);
     for (int step = 0; step < kStepsPerGate; ++step) {
       look(prior, T_body_cam, points, registration, trial);
       // The last look is at the aligned state: it only measures.

@@ -18,19 +18,20 @@ namespace evpose {
 
 /// What is known of the camera's view before it has told anything.
 struct SeenPrior {
-  NavState nav;                            ///< pose as it is seen: the body's, were the given T_body_cam true
-  AdjustedCamera::Correction numbers;      ///< of the camera, present correction; empty: they are known
-  Eigen::MatrixXd covariance;              ///< of pose (as Pose::plus), velocity, numbers
+  NavState nav;                        ///< pose as it is seen: the body's, were the given T_body_cam true
+  AdjustedCamera::Correction numbers;  ///< of the camera, present correction; empty: they are known
+  Eigen::MatrixXd covariance;          ///< of pose (as Pose::plus), velocity, numbers
 };
 
-/// Aligns the first view of a camera whose calibration is uncertain. Contours then lie up to several pixels from
-/// where they are expected, further than the tracker's gate reaches, and not all by the same motion: an error of the
-/// focal length moves the rim alone. So the events of the first moments are looked at again and again, at their own
-/// times and under gates that close from several pixels to the tracker's (graduated non-convexity), for the pose, the
-/// velocity and the camera's numbers together. This begins at several poses (search_pose()), once with the numbers
-/// free and once with the pose alone at first; what gathers most events at the contours is taken. Errors that the
-/// events of one edge share are eliminated with a variance of their own for each edge (Student-t), so that the
-/// covariance is one that single disturbed edges do not mislead.
+/// Aligns the first view of a camera whose calibration is uncertain. Contours then lie up to several pixels
+/// from where they are expected, further than the tracker's gate reaches, and not all by the same motion: an
+/// error of the focal length moves the rim alone. So the events of the first moments are looked at again and
+/// again, at their own times and under gates that close from several pixels to the tracker's (graduated
+/// non-convexity), for the pose, the velocity and the camera's numbers together. This begins at several poses
+/// (search_pose()), once with the numbers free and once with the pose alone at first; what gathers most
+/// events at the contours is taken. Errors that the events of one edge share are eliminated with a variance
+/// of their own for each edge (Student-t), so that the covariance is one that single disturbed edges do not
+/// mislead.
 class StartAlignment {
  public:
   /// Worth its time where contours are expected to lie further off than this, px (root mean square).
@@ -49,8 +50,8 @@ class StartAlignment {
     intervals_.add(events, now_us, motion, angular_rate);
   }
   bool has_enough() const { return intervals_.duration_s() >= kDuration_s; }
-  /// What the events added so far say of pose and numbers about the prior's mean. None: no view was found at which
-  /// they gather at the contours; other events are then waited for. Changes the camera's correction.
+  /// What the events added so far say of pose and numbers about the prior's mean. None: no view was found at
+  /// which they gather at the contours; other events are then waited for. Changes the camera's correction.
   std::optional<SeenMeasurement> align(const SeenPrior& prior, const Pose& T_body_cam);
 
  private:

@@ -140,9 +140,10 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   supervisor_.start(fusion_->state(), uncertainty.sigma_px());
   const CalibrationConfig& uncertain = config.fusion.calibration;
   if (uncertain.intrinsics || uncertain.rotation || uncertain.translation)
-    start_alignment_.emplace(RelocalizerScene{index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
-                                              config.visible, config.event_registration},
-                             adjusted_.get());
+    start_alignment_.emplace(
+        RelocalizerScene{index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
+                         config.visible, config.event_registration},
+        adjusted_.get());
   contours_.prepare(start.T_map_body);
 }
 
@@ -219,8 +220,8 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   imu_.restart_comparison();
 }
 
-/// While the first view of a camera whose calibration is uncertain is aligned, nothing else is measured. True: it
-/// was so in this update.
+/// While the first view of a camera whose calibration is uncertain is aligned, nothing else is measured.
+/// True: it was so in this update.
 bool Tracker::align_start(TimeNs t, const ImuIncrement& moved) {
   if (!start_alignment_ || supervisor_.searching()) return false;
   const FusionState& state = fusion_->state();

@@ -22,6 +22,8 @@ static Status follow(const char* recording_path, const char* map_path) {
 
   TrackerSetup setup;
   setup.camera = *camera;
+  setup.intrinsics = recording->camera;
+  setup.calibration_sigma = recording->calibration_sigma;
   setup.T_body_cam = recording->T_cam_body.inverse();
   setup.imu_noise = recording->imu_noise;
   setup.map = std::make_shared<const ContourMap>(std::move(*map));

@@ -140,7 +140,8 @@ Status print_calibration_errors(const Selection& selection, int draws) {
   if (!recordings) return recordings.error();
   std::printf(
       "| recording | given wrong | camera mm | body mm | ARE deg | NEES/6 | tracking %% | silently wrong %% "
-      "| told: camera mm | told: body mm | told: ARE deg | told: NEES/6 | told: tracking %% | told: silently wrong %% |\n"
+      "| told: camera mm | told: body mm | told: ARE deg | told: NEES/6 | told: tracking %% | told: silently "
+      "wrong %% |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const BenchRecording& recording : *recordings) {
     const auto streams = load_streams(recording, *config);

@@ -14,7 +14,8 @@ struct Streams {
   std::vector<EventPacket> packets;
   std::vector<ImuSample> imu;
 };
-/// The calibration counts as known: that of the recordings is the truth, and what is wrong with it, an experiment says.
+/// The calibration counts as known: that of the recordings is the truth, and what is wrong with it, an
+/// experiment says.
 Expected<Streams> load_streams(const TrackRequest& request, const RunConfig& config);
 
 /// Feeds the packets and, ahead of each, the IMU samples that reach its end.

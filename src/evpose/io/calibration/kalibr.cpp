@@ -45,7 +45,8 @@ Status write_kalibr_camera(const std::string& path, const CalibratedCamera& came
   if (sigma.distortion) out += "  distortion_sigma: " + list(*sigma.distortion) + "\n";
   if (sigma.rotation_rad && sigma.translation_m) {
     const Eigen::Vector3d turn = *sigma.rotation_rad * (180 / M_PI), &shift = *sigma.translation_m;
-    out += "  T_cam_imu_sigma: " + list({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()}) + "\n";
+    out +=
+        "  T_cam_imu_sigma: " + list({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()}) + "\n";
   }
   if (sigma.time_s) out += "  timeshift_sigma: " + exact(*sigma.time_s) + "\n";
   return write_text_file(path, out);

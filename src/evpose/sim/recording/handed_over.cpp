@@ -90,7 +90,8 @@ CalibrationErrors draw_calibration_errors(const HandedOverConfig& config, std::u
 CalibrationSigma stated_sigma(const HandedOverConfig& config, const CameraIntrinsics& camera) {
   const HandedOverConfig c = with_preset_values(config);
   CalibrationSigma sigma = CalibrationSigma::known(camera);
-  sigma.intrinsics = {c.focal_sigma * camera.fx, c.focal_sigma * camera.fy, c.centre_sigma_px, c.centre_sigma_px};
+  sigma.intrinsics = {c.focal_sigma * camera.fx, c.focal_sigma * camera.fy, c.centre_sigma_px,
+                      c.centre_sigma_px};
   if (camera.distortion.size() == 4) sigma.distortion = {c.k1_sigma, c.k2_sigma, c.p1_sigma, c.p2_sigma};
   sigma.rotation_rad = Eigen::Vector3d::Constant(kDegree * c.rotation_sigma_deg);
   sigma.translation_m = Eigen::Vector3d::Constant(1e-3 * c.translation_sigma_mm);

@@ -67,11 +67,13 @@ TEST(HandedOver, TheFileStatesTheSpreadOfItsErrors) {
   const Eigen::VectorXd of_numbers = stated.of_intrinsics(*truth.intrinsics);
   Eigen::VectorXd sums = Eigen::VectorXd::Zero(of_numbers.size() + 7);
   for (int seed = 0; seed < kSeeds; ++seed) {
-    const CalibratedCamera wrong = with_errors(truth, draw_calibration_errors(config, static_cast<std::uint64_t>(seed)));
+    const CalibratedCamera wrong =
+        with_errors(truth, draw_calibration_errors(config, static_cast<std::uint64_t>(seed)));
     const CameraIntrinsics &a = *truth.intrinsics, &b = *wrong.intrinsics;
     Eigen::VectorXd z(sums.size());
     z.head<4>() << b.fx - a.fx, b.fy - a.fy, b.cx - a.cx, b.cy - a.cy;
-    for (std::size_t i = 0; i < 4; ++i) z(static_cast<Eigen::Index>(i) + 4) = b.distortion[i] - a.distortion[i];
+    for (std::size_t i = 0; i < 4; ++i)
+      z(static_cast<Eigen::Index>(i) + 4) = b.distortion[i] - a.distortion[i];
     z.head<8>().array() /= of_numbers.array();
     const Pose given = wrong.T_cam_imu->inverse(), is = truth.T_cam_imu->inverse();
     z.segment<3>(8) = so3::log(given.q * is.q.conjugate()).cwiseQuotient(*stated.rotation_rad);

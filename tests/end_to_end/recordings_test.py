@@ -110,7 +110,7 @@ class RecordingsTest(unittest.TestCase):
             told = file["contours/contrast_sign"][:]
         self.assertGreater((told != 0).sum(), 0.02 * len(told))
         command = [EVPOSE, "-q", "track", SHARED / "data/peer/room_hover", "--map", learnt, *occluders("room_hover"),
-                   "-o", self.out / "second"]
+                   "-o", self.out / "second", "--set", "fusion.calibration.on=false"]
         result = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.check(json.loads((self.out / "second/summary.json").read_text()), published("each event once")["room_hover"])

@@ -20,8 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kFiles{"trajectory.tum", "trajectory_camera.tum", "states.csv",  "states_imu.csv",
-                            "latency.csv",    "summary.json",          "config.yaml", "report.html"};
+constexpr std::array kFiles{"trajectory.tum", "trajectory_camera.tum", "states.csv",
+                            "states_imu.csv", "latency.csv",           "summary.json",
+                            "config.yaml",    "report.html",           "calibration.yaml"};
 
 /// Nothing, an empty folder, or if asked for an earlier run may be replaced.
 Status check_place(const fs::path& place, bool replace) {

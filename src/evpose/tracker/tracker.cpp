@@ -66,7 +66,12 @@ Status check_start(const ContourMap& map, const StartState& start, double far_m)
   return {};
 }
 
-/// What is uncertain of the calibration becomes a state. Without an IMU body and camera are one.
+// Why an update measures nothing.
+const char* const kTimeIsPast = "the time offset has changed";  // by more than an update
+const char* const kAligning = "aligning the first view";
+
+/// What is uncertain of the calibration becomes a state. Without an IMU body and camera are one, and
+/// intrinsics of which nothing is stated count as known.
 void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
   CalibrationConfig& c = fusion.calibration;
   c.time_offset = c.rotation = c.translation = c.intrinsics = false;
@@ -80,7 +85,9 @@ void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
     c.rotation = (c.start_rotation_sigma_rad.array() > 0).any();
     c.translation = (c.start_translation_sigma_m.array() > 0).any();
   }
-  if (!setup.intrinsics) return;
+  // Held by constant velocity alone, the pose is too loose to tell the camera from nothing that was stated.
+  const bool held = setup.motion == MotionModel::imu || sigma.intrinsics || sigma.distortion;
+  if (!setup.intrinsics || !held) return;
   c.start_intrinsics_sigma = sigma.of_intrinsics(*setup.intrinsics);
   c.intrinsics = (c.start_intrinsics_sigma.array() > 0).any();
 }
@@ -196,10 +203,8 @@ Update Tracker::update(TimeNs t) {
   reporter_.end_stage(&StageTimes::register_s);
   const double innovation =
       evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
-  // When the time offset found has fallen by more than an update, this update's time is past.
-  const std::string refused = imu_time(t) < from ? "the time offset has changed"
-                              : aligning         ? "aligning the first view"
-                                                 : supervisor_.refusal(t, stpe, innovation);
+  std::string refused = aligning ? kAligning : supervisor_.refusal(t, stpe, innovation);
+  if (imu_time(t) < from) refused = kTimeIsPast;
   if (refused.empty()) fuse(stpe);  // eq. (3), (5), (6)
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty());

@@ -33,7 +33,8 @@ struct TrackerSetup {
   ImuNoise imu_noise;
   std::shared_ptr<const ContourMap> map;
   std::optional<CameraIntrinsics> intrinsics = {};  ///< of the camera; without them they count as known
-  /// How wrong `camera` and T_body_cam and the time of the IMU may be; none: they are known.
+  /// How wrong `camera` and T_body_cam and the time of the IMU may be; none: they are known. Without an IMU,
+  /// so are intrinsics of which it states nothing.
   std::optional<CalibrationSigma> calibration_sigma = {};
 };
 

@@ -17,6 +17,7 @@ struct CalibrationError {
   Eigen::Vector3d turn_deg;  ///< of the given camera about the body's axes
   Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();
 
+  bool timed() const { return offset_s != 0 || !(turned() || shifted()); }
   bool turned() const { return turn_deg.norm() > 0; }
   bool shifted() const { return shift_mm.norm() > 0; }
   Eigen::Vector3d turn_rad() const { return turn_deg * kDegree; }
@@ -37,7 +38,7 @@ struct CalibrationOutcome {
 void spoil(const CalibrationError& error, Streams& streams) {
   FusionConfig& fusion = streams.job.config.tracker.fusion;
   CalibrationSigma sigma = CalibrationSigma::known(*streams.job.setup.intrinsics);
-  if (error.offset_s != 0 || !(error.turned() || error.shifted())) sigma.time_s = kSpoiltTimeSigma_s;
+  if (error.timed()) sigma.time_s = kSpoiltTimeSigma_s;
   if (error.shifted()) sigma.translation_m.reset();
   if (error.turned()) sigma.rotation_rad = Eigen::Vector3d::Constant(kSpoiltRotationSigma_rad);
   streams.job.setup.calibration_sigma = sigma;
@@ -72,8 +73,7 @@ Expected<CalibrationOutcome> track(const Streams& streams) {
   return out;
 }
 
-void print_row(const std::string& name, const CalibrationError& error, const CalibrationConfig& estimated,
-               const CalibrationOutcome& outcome) {
+void print_row(const std::string& name, const CalibrationError& error, const CalibrationOutcome& outcome) {
   const Calibration& found = outcome.found;
   std::printf("| %s | %.0f | %.1f, %.1f, %.1f | %.0f, %.0f, %.0f | %s | ", name.c_str(), 1e3 * error.offset_s,
               error.turn_deg.x(), error.turn_deg.y(), error.turn_deg.z(), error.shift_mm.x(),
@@ -85,11 +85,11 @@ void print_row(const std::string& name, const CalibrationError& error, const Cal
       std::printf("- | ");
   };
   const Eigen::Quaterniond turn = so3::exp(error.turn_rad());
-  cell(estimated.time_offset, "%.3f +- %.3f | ", 1e3 * (found.time_offset_s - error.offset_s),
+  cell(error.timed(), "%.3f +- %.3f | ", 1e3 * (found.time_offset_s - error.offset_s),
        1e3 * found.time_sigma_s);
-  cell(estimated.rotation, "%.3f +- %.3f | ", so3::log(found.turn * turn.conjugate()).norm() / kDegree,
+  cell(error.turned(), "%.3f +- %.3f | ", so3::log(found.turn * turn.conjugate()).norm() / kDegree,
        found.turn_sigma_rad.norm() / kDegree);
-  cell(estimated.translation, "%.1f +- %.1f | ", (1e3 * found.shift - error.shift_mm).norm(),
+  cell(error.shifted(), "%.1f +- %.1f | ", (1e3 * found.shift - error.shift_mm).norm(),
        1e3 * found.shift_sigma_m.norm());
   std::printf("%.0f |\n", 100.0 * outcome.frozen / std::max(1, outcome.updates));
   std::fflush(stdout);
@@ -114,7 +114,7 @@ Status print_calibration(const Selection& selection) {
       spoil(error, spoilt);
       const auto outcome = track(spoilt);
       if (!outcome) return outcome.error();
-      print_row(recording.name, error, spoilt.job.config.tracker.fusion.calibration, *outcome);
+      print_row(recording.name, error, *outcome);
     }
   }
   return {};

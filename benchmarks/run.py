@@ -28,7 +28,7 @@ BENCHMARKS = {
     "relocalization": ("experiments", "make_relocalization", "starts from wrong poses", "20 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
-    "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "2 min"),
+    "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "15 min"),
     "map": ("maps", "make", "maps built from clouds, and tracking with them", "15 min"),
     "map-scale": ("map_scale", "make", "time and memory of map building", "10 min"),
     "latency": ("latency", "make", "stages of an update on whole recordings", "1 min"),

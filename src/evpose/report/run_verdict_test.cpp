@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 namespace evpose {
@@ -21,7 +22,7 @@ StateLog log_of(const std::vector<Stretch>& stretches) {
   for (const Stretch& stretch : stretches) {
     u.health = stretch.health;
     u.reason = stretch.reason;
-    for (int i = 0; i < static_cast<int>(100 * stretch.s + 0.5); ++i) {
+    for (int i = 0; i < std::lround(100 * stretch.s); ++i) {
       log.add(u);
       u.t += 10 * kNsPerMs;
       u.reason.clear();

@@ -20,15 +20,15 @@ Eigen::VectorXd ordinary(const CameraIntrinsics& c) {
 
 }  // namespace
 
-CalibrationSigma CalibrationSigma::known(const CameraIntrinsics& c) {
-  return {std::vector<double>(4), std::vector<double>(c.distortion.size()), Eigen::Vector3d::Zero(),
+CalibrationSigma CalibrationSigma::known(const CameraIntrinsics& camera) {
+  return {std::vector<double>(4), std::vector<double>(camera.distortion.size()), Eigen::Vector3d::Zero(),
           Eigen::Vector3d::Zero(), 0};
 }
 
-Eigen::VectorXd CalibrationSigma::of_intrinsics(const CameraIntrinsics& c) const {
-  Eigen::VectorXd sigma = ordinary(c);
+Eigen::VectorXd CalibrationSigma::of_intrinsics(const CameraIntrinsics& camera) const {
+  Eigen::VectorXd sigma = ordinary(camera);
   if (intrinsics && intrinsics->size() == 4) std::copy(intrinsics->begin(), intrinsics->end(), sigma.begin());
-  if (distortion && distortion->size() == c.distortion.size())
+  if (distortion && distortion->size() == camera.distortion.size())
     std::copy(distortion->begin(), distortion->end(), sigma.begin() + 4);
   return sigma;
 }

@@ -19,7 +19,7 @@ struct CalibrationSigma {
   std::optional<double> time_s;                   ///< of the IMU's clock against the camera's
 
   /// All zero.
-  static CalibrationSigma known(const CameraIntrinsics& intrinsics);
+  static CalibrationSigma known(const CameraIntrinsics& camera);
 
   /// In the order of AdjustedCamera. Without a statement: focal length 0.3 %, centre 1 px, k1 0.01, further
   /// ones 0.02, p1 and p2 0.0005.

@@ -39,7 +39,7 @@ Expected<FusionConfig> resolved(const FusionConfig& config, bool map_states_erro
   const bool filter = config.kind == BackEndKind::ekf;
   if (!filter && config.calibration.any())
     return Error{"fusion.kind", "only ekf estimates the calibration",
-                 "set fusion.kind=ekf, or all of fusion.calibration to false"};
+                 "set fusion.kind=ekf, or fusion.calibration.gravity=false"};
   if (!filter && config.segment_offsets == SegmentOffsetUse::on)
     return Error{"fusion.kind", "only ekf estimates offsets of map segments",
                  "set fusion.kind=ekf, or fusion.segment_offsets=off"};

@@ -16,6 +16,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # The shared recordings and the place that each was made in.
 PEER = {"room_spiral": "room", "room_720p": "room", "room_people": "room", "room_hover": "room",
         "courtyard_landing": "courtyard"}
+MORE_PEERS = ["room_c", "room_e", "courtyard_b"]
+OTHER_VIEW = "room_other_view"  # in the first room
 START_S = 0.3  # of a run, after which figures "after 0.3 s" begin
 
 
@@ -83,6 +85,26 @@ class Bench:
     def peers(self):
         """All shared recordings; the shortest alone where it has to be quick."""
         return [self.peer(name) for name in (["room_720p"] if self.quick else PEER)]
+
+    def more_peers(self):
+        """Shared recordings of places that no default was chosen on."""
+        folder = self.shared / "data/peer_more"
+        room = self.peer("room_spiral")
+        return [Recording(name, folder / name, folder / name / "contours.ply", folder / name / "mesh.ply")
+                for name in MORE_PEERS] + [Recording(OTHER_VIEW, folder / OTHER_VIEW, room.contours, room.mesh)]
+
+    def unseen_flights(self):
+        """Flights of reporting seeds that `evpose bench unseen` has made, in order of the seeds."""
+        folders = sorted(self.unseen_folder.glob(("quick_" if self.quick else "") + "flight_????"))
+        made = [folder for folder in folders if (folder / "flight.json").exists()]
+        if not made:
+            raise Failure(f"{self.unseen_folder}: no flights; make them first: benchmarks/run.py unseen")
+        return [Recording(f"seed {int(folder.name[-4:])}", folder, folder / "contours.ply", folder / "mesh.ply")
+                for folder in made]
+
+    @property
+    def unseen_folder(self):
+        return self.scratch / "recordings/unseen"
 
     def simulated(self, scenario, seconds, settings=(), name=None):
         """A recording of that scenario, made if it is not there. A changed simulator makes none of them anew: delete

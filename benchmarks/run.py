@@ -22,9 +22,10 @@ import harness
 BENCHMARKS = {
     "accuracy": ("accuracy", "make", "shared recordings and a real chunk, by field and IMU", "2 min"),
     "simulator": ("simulator", "make", "simulated flights", "2 h"),
-    "unseen": ("experiments", "make_unseen", "flights that nobody has looked at, with all that may be wrong", "1 h"),
+    "unseen": ("experiments", "make_unseen", "flights that nobody has looked at, with all that may be wrong", "3 h"),
     "ablation": ("experiments", "make_ablation", "the tracker without one of its parts; its picture", "10 min"),
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
+    "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
     "relocalization": ("experiments", "make_relocalization", "starts from wrong poses", "20 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),

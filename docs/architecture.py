@@ -34,6 +34,7 @@ PLACES = {
     "mavlink": (5, 915, 265, "frames, messages, link"),
     "run": (6, 290, 310, "a recording through the tracker"),
     "view": (6, 640, 265, "browser: server and pages"),
+    "batch": (7, 290, 310, "all data at once: smoother"),
     "bench": (7, 20, 240, "what the figures are made with"),
     "apps": (8, 290, 490, "the program: one file per command"),
     "ros": (8, 800, 180, "ROS 1 node"),

@@ -186,7 +186,7 @@ Expected<RunOutcome> finish(RunFolder& run, const TrackJob& job, const ServeRequ
   if (session.counts().updates == 0 || session.tracker() == nullptr)
     return Error{request.track.recording, "the stream ended before the first update",
                  "check that events and IMU arrive and cover the start"};
-  RunSummary summary = summarise(job, request.track, *session.tracker());
+  RunSummary summary = summarise(job, request.track, *session.tracker(), session.tracker()->calibration());
   summary.events_read = session.counts().events - session.counts().events_shed;
   summary.events_kept += session.counts().events_kept;
   summary.events_shed +=

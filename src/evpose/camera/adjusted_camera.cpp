@@ -10,15 +10,6 @@ namespace {
 constexpr double kStep_px = 0.01;        // at the rim, of a derivative's difference
 constexpr double kUnnoticed_px = 0.002;  // at the rim, of a correction that is not worth a new camera
 
-CameraIntrinsics sum(const CameraIntrinsics& given, const AdjustedCamera::Correction& correction) {
-  CameraIntrinsics out = given;
-  double* const first[] = {&out.fx, &out.fy, &out.cx, &out.cy};
-  for (Eigen::Index i = 0; i < 4; ++i) *first[i] += correction(i);
-  for (std::size_t i = 0; i < out.distortion.size(); ++i)
-    out.distortion[i] += correction(static_cast<Eigen::Index>(i) + 4);
-  return out;
-}
-
 /// Changes of the numbers that move a pixel at the rim by about one px. The distortion's terms grow with the
 /// radius there, at most about 1 in units of the focal length; a step need not be exact.
 AdjustedCamera::Correction per_px(const CameraIntrinsics& c) {
@@ -32,6 +23,15 @@ AdjustedCamera::Correction per_px(const CameraIntrinsics& c) {
 
 }  // namespace
 
+CameraIntrinsics corrected(const CameraIntrinsics& given, const Eigen::VectorXd& correction) {
+  CameraIntrinsics out = given;
+  double* const first[] = {&out.fx, &out.fy, &out.cx, &out.cy};
+  for (Eigen::Index i = 0; i < 4; ++i) *first[i] += correction(i);
+  for (std::size_t i = 0; i < out.distortion.size(); ++i)
+    out.distortion[i] += correction(static_cast<Eigen::Index>(i) + 4);
+  return out;
+}
+
 Expected<std::shared_ptr<AdjustedCamera>> AdjustedCamera::create(const CameraIntrinsics& given) {
   const auto camera = make_camera(given);
   if (!camera) return camera.error();
@@ -39,7 +39,7 @@ Expected<std::shared_ptr<AdjustedCamera>> AdjustedCamera::create(const CameraInt
   const Eigen::Index n = out->step_.size();
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto step = [&](double sign) {
-      return make_camera(sum(given, sign * out->step_(i) * Correction::Unit(n, i)));
+      return make_camera(corrected(given, sign * out->step_(i) * Correction::Unit(n, i)));
     };
     auto stepped = step(1);
     if (!stepped) {  // at the end of a number's range
@@ -63,7 +63,7 @@ bool AdjustedCamera::set_correction(const Correction& correction) {
   EVPOSE_CHECK(correction.size() == applied_.size());
   const double change = (correction - applied_).cwiseQuotient(step_).cwiseAbs().sum() * kStep_px;
   if (change < kUnnoticed_px) return true;
-  const auto camera = make_camera(sum(numbers_, correction));
+  const auto camera = make_camera(corrected(numbers_, correction));
   if (!camera) return false;
   now_ = *camera;
   applied_ = correction;

@@ -10,6 +10,9 @@
 
 namespace evpose {
 
+/// The intrinsics with each number changed by its entry, in that order.
+CameraIntrinsics corrected(const CameraIntrinsics& given, const Eigen::VectorXd& correction);
+
 /// A camera whose given intrinsics are corrected while it is in use. The numbers stand in the order fx, fy,
 /// cx, cy (px), then `CameraIntrinsics::distortion`.
 class AdjustedCamera final : public Camera {

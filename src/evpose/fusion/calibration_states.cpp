@@ -12,6 +12,34 @@ constexpr double kLeastVelocity_m_s = 0.05, kLeastRate_rad_s = 0.05, kExcitation
 
 }  // namespace
 
+Vector6d seen_pose_by_time_offset(const FusionState& state) {
+  Vector6d out;
+  out << state.nav.velocity, state.angular_rate;
+  return out;
+}
+
+/// The camera's pose is what is seen; the body's follows from it by the given T_body_cam.
+Eigen::Matrix<double, 6, 3> seen_pose_by_rotation(const FusionState& state,
+                                                  const Eigen::Vector3d& p_body_cam) {
+  Eigen::Matrix<double, 6, 3> out;
+  out << state.nav.T_map_body.rotation() * so3::hat(p_body_cam), Eigen::Matrix3d::Identity();
+  return out;
+}
+
+Eigen::Matrix<double, 6, 3> seen_pose_by_translation(const FusionState& state) {
+  Eigen::Matrix<double, 6, 3> out;
+  out << state.nav.T_map_body.rotation(), Eigen::Matrix3d::Zero();
+  return out;
+}
+
+Eigen::Matrix<double, 15, 2> state_by_gravity_tilt(const Eigen::Vector3d& gravity_map, double dt_s) {
+  const Eigen::Matrix<double, 3, 2> by_tilt = -so3::hat(gravity_map).leftCols<2>();
+  Eigen::Matrix<double, 15, 2> out = Eigen::Matrix<double, 15, 2>::Zero();
+  out.middleRows<3>(error_state::kV) = dt_s * by_tilt;
+  out.middleRows<3>(error_state::kP) = 0.5 * dt_s * dt_s * by_tilt;
+  return out;
+}
+
 CalibrationStates::CalibrationStates(const CalibrationConfig& config, const Pose& T_body_cam)
     : config_(config), T_body_cam_(T_body_cam) {}
 
@@ -46,11 +74,7 @@ void CalibrationStates::start(ErrorStateFilter& filter) {
 void CalibrationStates::propagate(ErrorStateFilter& filter, const Eigen::Vector3d& gravity_map,
                                   double dt_s) const {
   if (!gravity_) return;
-  const Eigen::Matrix<double, 3, 2> by_tilt = -so3::hat(gravity_map).leftCols<2>();
-  ErrorStateFilter::ByState by_block = ErrorStateFilter::ByState::Zero(15, 2);
-  by_block.middleRows<3>(error_state::kV) = dt_s * by_tilt;
-  by_block.middleRows<3>(error_state::kP) = 0.5 * dt_s * dt_s * by_tilt;
-  filter.add_effect(*gravity_, by_block);
+  filter.add_effect(*gravity_, state_by_gravity_tilt(gravity_map, dt_s));
 }
 
 void CalibrationStates::judge_excitation(ErrorStateFilter& filter) {
@@ -72,23 +96,9 @@ void CalibrationStates::judge_excitation(ErrorStateFilter& filter) {
 
 std::vector<PoseShift> CalibrationStates::pose_shifts(const FusionState& state) const {
   std::vector<PoseShift> shifts;
-  const Eigen::Matrix3d R = state.nav.T_map_body.rotation();
-  const auto add = [&](BlockId block, Eigen::Index size) -> auto& {
-    shifts.push_back({block, decltype(PoseShift::by_block)::Zero(6, size)});
-    return shifts.back().by_block;
-  };
-  if (time_) {
-    auto& by_time = add(*time_, 1);
-    by_time.topRows<3>() = state.nav.velocity;
-    by_time.bottomRows<3>() = state.angular_rate;
-  }
-  // The camera's pose is what is seen; the body's follows from it by the given T_body_cam.
-  if (rotation_) {
-    auto& by_rotation = add(*rotation_, 3);
-    by_rotation.topRows<3>() = R * so3::hat(T_body_cam_.p + found_.shift);
-    by_rotation.bottomRows<3>().setIdentity();
-  }
-  if (translation_) add(*translation_, 3).topRows<3>() = R;
+  if (time_) shifts.push_back({*time_, seen_pose_by_time_offset(state)});
+  if (rotation_) shifts.push_back({*rotation_, seen_pose_by_rotation(state, T_body_cam_.p + found_.shift)});
+  if (translation_) shifts.push_back({*translation_, seen_pose_by_translation(state)});
   return shifts;
 }
 

@@ -9,6 +9,15 @@
 
 namespace evpose {
 
+/// What errors of the calibration do to the pose that is seen (6) and to the state.
+Vector6d seen_pose_by_time_offset(const FusionState& state);
+/// `p_body_cam`: the camera's place, m.
+Eigen::Matrix<double, 6, 3> seen_pose_by_rotation(const FusionState& state,
+                                                  const Eigen::Vector3d& p_body_cam);
+Eigen::Matrix<double, 6, 3> seen_pose_by_translation(const FusionState& state);
+/// Within `dt_s`, by gravity's tilt about the map's x and y.
+Eigen::Matrix<double, 15, 2> state_by_gravity_tilt(const Eigen::Vector3d& gravity_map, double dt_s);
+
 /// The calibration as blocks of a filter: time offset between IMU and camera, rotation and translation of the
 /// camera in the body, direction of gravity in the map, and the camera's intrinsics. While the motion cannot
 /// tell the first three from an error of the pose they are considered, not estimated.

@@ -315,6 +315,7 @@ EdgeProfileFit as_fit(const EdgeProfile& profile, const Tried& best, double gain
   Densities shares;
   const Matrix covariance = profile.information(s, &gradient, &shares).inverse();
   EdgeProfileFit out;
+  if (!covariance.allFinite()) return out;  // of what these points tell nothing about
   out.place = s.geometry[0];
   out.slope = s.geometry[1];
   out.height = s.geometry[2];

@@ -148,6 +148,7 @@ StepFit fit_step(std::span<const Eigen::Vector2d> points, double half_length, do
   out.place = step.place;
   out.slope = step.slope;
   const Eigen::Matrix3d covariance = information.inverse();
+  if (!(covariance(0, 0) > 0 && covariance(1, 1) > 0)) out.converged = false;
   out.sigma_place = std::sqrt(covariance(0, 0));
   out.sigma_slope = std::sqrt(covariance(1, 1));
   out.rest = step.outside / step.inside;

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <memory>
 
+#include "evpose/camera/adjusted_camera.h"
 #include "evpose/core/log.h"
 #include "evpose/io/files/config_yaml.h"
 #include "evpose/io/maps/contour_files.h"
@@ -188,9 +189,8 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
 
 namespace {
 
-/// What the tracker was given of the calibration and knows of it in the end; none: it counted as known.
-std::optional<RunCalibration> calibration_of(const TrackJob& job, const Tracker& tracker) {
-  const Calibration found = tracker.calibration();
+/// What was given of the calibration and is known of it in the end; none: it counted as known.
+std::optional<RunCalibration> calibration_of(const TrackJob& job, const Calibration& found) {
   const Recording& recording = job.recording;
   RunCalibration out;
   CalibratedCamera& given = out.given;
@@ -212,11 +212,7 @@ std::optional<RunCalibration> calibration_of(const TrackJob& job, const Tracker&
   out.found = given;
   CalibratedCamera& known = out.found;
   if (found.intrinsics.size() > 0) {
-    CameraIntrinsics& c = *known.intrinsics;
-    c.fx += found.intrinsics(0), c.fy += found.intrinsics(1);
-    c.cx += found.intrinsics(2), c.cy += found.intrinsics(3);
-    for (std::size_t i = 0; i < c.distortion.size(); ++i)
-      c.distortion[i] += found.intrinsics(static_cast<Eigen::Index>(i) + 4);
+    known.intrinsics = corrected(*known.intrinsics, found.intrinsics);
     of_numbers(found.intrinsics_sigma, known.sigma);
   }
   if (recording.has_imu) {
@@ -234,7 +230,8 @@ std::optional<RunCalibration> calibration_of(const TrackJob& job, const Tracker&
 
 }  // namespace
 
-RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker) {
+RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker,
+                     const Calibration& found) {
   const Recording& recording = job.recording;
   const ContourMap& map = *job.map;
   RunSummary summary;
@@ -245,7 +242,7 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
                           "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
   summary.start = job.start_words;
   summary.findings = job.findings;
-  summary.calibration = calibration_of(job, tracker);
+  summary.calibration = calibration_of(job, found);
   summary.T_body_cam = job.setup.T_body_cam;
   if (summary.calibration && summary.calibration->found.T_cam_imu)
     summary.T_body_cam = summary.calibration->found.T_cam_imu->inverse();
@@ -341,7 +338,7 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   if (!request.learnt_map.empty())
     if (auto ok = write_learnt_map(request.learnt_map, *job->map, **tracker); !ok) return ok.error();
 
-  RunSummary summary = summarise(*job, request, **tracker);
+  RunSummary summary = summarise(*job, request, **tracker, (*tracker)->calibration());
   summary.interrupted = interrupted;
   summary.wall_s = wall_s() - wall_start;
   summary.cpu_s = cpu_s() - cpu_start;

@@ -64,8 +64,9 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
 /// `progress`, if any, is told the share of the recording, 0..1, and ends it by false.
 Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
                       const std::function<bool(double)>& progress);
-/// What the run folder is told at the end; without times and memory.
-RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker);
+/// What the run folder is told at the end; without times and memory. `found`: of the calibration.
+RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker,
+                     const Calibration& found);
 
 double wall_s();          ///< on a monotone clock
 double cpu_s();           ///< processor time of the program

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/tracker/event_intervals.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace evpose {
@@ -18,7 +20,10 @@ void EventIntervals::add(std::span<const FilteredEvent> events, std::uint32_t no
     }
   }
   EventInterval& newest = intervals_.back();
-  newest.events.insert(newest.events.end(), events.begin(), events.end());
+  const double most = std::max(1.0, kMostEvents_s * motion.dt_s);
+  const auto stride = std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::ceil(static_cast<double>(events.size()) / most)));
+  for (std::size_t i = 0; i < events.size(); i += stride) newest.events.push_back(events[i]);
   newest.now_us = now_us;
   newest.motion = joined(newest.motion, motion);
   newest.angular_rate = angular_rate;

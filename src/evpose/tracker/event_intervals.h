@@ -25,6 +25,9 @@ struct EventInterval {
 class EventIntervals {
  public:
   static constexpr double kInterval_s = 0.008;
+  /// Errors that an edge's events share count for more than the noise of so many: the rest is left out,
+  /// evenly.
+  static constexpr double kMostEvents_s = 1.25e6;
 
   /// Keeps the newest `most` intervals.
   explicit EventIntervals(std::size_t most) : most_(most) {}

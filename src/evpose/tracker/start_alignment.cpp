@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -21,7 +22,12 @@ constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band 
 constexpr double kNumbersFirst_px = 10;    // gates below which the camera's numbers are free: all,
 constexpr double kPoseFirst_px = 1.7;      // or the narrow ones
 constexpr double kHeld = 1e12;             // factor on the prior's information that holds the numbers
-constexpr double kLeastConcentration = 0.38;
+// Chance gives no concentration at all, a wrong view some. How much the right one gives depends on the
+// texture beside the contours. So much is the right one's:
+constexpr double kHighConcentration = 0.38;
+// With less, most begins have to lead to one view, and its contours have to have events.
+constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
+constexpr double kSameView = 2;         // sigma
 constexpr double kEdge_m = 0.6;         // an edge whose events share errors
 constexpr double kEdgeSigma_px = 0.15;  // of such an error; one degree of freedom
 
@@ -253,18 +259,29 @@ SeenMeasurement StartAlignment::without_velocity(const SeenPrior& prior, const T
   return {trial.H(kept, kept) - gain * trial.H(velocity, kept), vector(kept) - gain * vector(velocity)};
 }
 
+/// Share of the trials that led to the same view.
+double StartAlignment::agreement(const std::vector<Trial>& trials, const Trial& view) {
+  const auto agree = std::ranges::count_if(trials, [&](const Trial& other) {
+    const Eigen::VectorXd d = other.moved - view.moved;
+    return d.dot(view.H * d) < kSameView * kSameView * static_cast<double>(d.size());
+  });
+  return static_cast<double>(agree) / static_cast<double>(trials.size());
+}
+
 std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {
-  std::optional<Trial> best;
+  std::vector<Trial> trials;
   for (const Pose& from : first_guesses(prior, T_body_cam))
     for (const double numbers_below_px : {kNumbersFirst_px, kPoseFirst_px}) {
       if (numbers_below_px == kPoseFirst_px && prior.numbers.size() == 0) continue;
-      Trial trial = anneal(prior, from, T_body_cam, numbers_below_px);
-      if (!best || trial.support > best->support) best = std::move(trial);
+      trials.push_back(anneal(prior, from, T_body_cam, numbers_below_px));
     }
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);
   intervals_.clear();
-  if (best->concentration < kLeastConcentration) return {};
-  return without_velocity(prior, *best);
+  const Trial& best = *std::ranges::max_element(trials, {}, &Trial::support);
+  const bool agreed = best.concentration >= kLeastConcentration && best.support >= kLeastSupport &&
+                      agreement(trials, best) >= kLeastAgreement;
+  if (!agreed && best.concentration < kHighConcentration) return {};
+  return without_velocity(prior, best);
 }
 
 }  // namespace evpose

@@ -95,7 +95,8 @@ void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
 }  // namespace
 
 Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, const TrackerConfig& config,
-                                                   const StartState& start, StageClock clock) {
+                                                   const StartState& start, StageClock clock,
+                                                   const BackEndMaker& make_fusion) {
   EVPOSE_CHECK(setup.camera != nullptr && setup.map != nullptr);
   const ContourMap& map = *setup.map;
   if (map.points.empty())
@@ -106,18 +107,22 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   TrackerConfig resolved_config = config;
   resolved_config.fusion = *fusion;
   choose_states(setup, resolved_config.fusion);
-  if (!resolved_config.fusion.calibration.intrinsics)
-    return std::unique_ptr<Tracker>(new Tracker(setup, resolved_config, start, std::move(clock), nullptr));
-  auto adjusted = AdjustedCamera::create(*setup.intrinsics);
-  if (!adjusted) return adjusted.error();
   TrackerSetup own = setup;
-  own.camera = *adjusted;
+  std::shared_ptr<AdjustedCamera> adjusted;
+  if (resolved_config.fusion.calibration.intrinsics) {
+    auto made = AdjustedCamera::create(*setup.intrinsics);
+    if (!made) return made.error();
+    own.camera = adjusted = std::move(*made);
+  }
+  auto back_end =
+      make_fusion ? make_fusion(resolved_config.fusion)
+                  : make_back_end(setup.motion, resolved_config.fusion, setup.imu_noise, setup.T_body_cam);
   return std::unique_ptr<Tracker>(
-      new Tracker(own, resolved_config, start, std::move(clock), std::move(*adjusted)));
+      new Tracker(own, resolved_config, start, std::move(clock), std::move(adjusted), std::move(back_end)));
 }
 
 Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start,
-                 StageClock clock, std::shared_ptr<AdjustedCamera> adjusted)
+                 StageClock clock, std::shared_ptr<AdjustedCamera> adjusted, std::unique_ptr<BackEnd> fusion)
     : setup_(setup),
       adjusted_(std::move(adjusted)),
       config_(config),
@@ -131,7 +136,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
       registration_(make_registration(config, setup_.camera->size(), *setup_.map, segments_)),
-      fusion_(make_back_end(setup.motion, config.fusion, setup.imu_noise, setup.T_body_cam)),
+      fusion_(std::move(fusion)),
       supervisor_(config.relocalization, config.health,
                   Relocalizer({index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
                                config.visible, config.event_registration})),

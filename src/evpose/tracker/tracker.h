@@ -46,14 +46,18 @@ struct StartState {
   Eigen::Vector3d angular_rate_body = Eigen::Vector3d::Zero();  ///< rad/s; used without an IMU
 };
 
+/// Makes a fusion framework for settings whose automatic choices are made.
+using BackEndMaker = std::function<std::unique_ptr<BackEnd>(const FusionConfig&)>;
+
 /// Events and IMU samples in, poses out. Knows neither files nor wall time; the same data give the same
 /// bytes, however they are cut into packets and for any number of threads.
 class Tracker {
  public:
   /// Error: a start that is not finite, or further from the map than the map can be seen; settings that
-  /// exclude each other. `clock`: for Update::times alone.
+  /// exclude each other. `clock`: for Update::times alone. `fusion`: instead of what the settings name.
   static Expected<std::unique_ptr<Tracker>> create(const TrackerSetup& setup, const TrackerConfig& config,
-                                                   const StartState& start, StageClock clock = {});
+                                                   const StartState& start, StageClock clock = {},
+                                                   const BackEndMaker& fusion = {});
 
   /// Called at each update, in order of time.
   void on_update(std::function<void(const Update&)> callback) { update_callback_ = std::move(callback); }
@@ -75,6 +79,8 @@ class Tracker {
   /// From now on a time surface is kept for snapshots, or no longer.
   void keep_time_surface(bool on) { preprocessor_.keep_surface(on || registration_->reads_surface()); }
 
+  /// The newest state, with its covariance.
+  const FusionState& state() const { return fusion_->state(); }
   const EventPreprocessor& events() const { return preprocessor_; }
   /// What the fusion found to be wrong with the given calibration, if it was asked to look.
   Calibration calibration() const { return fusion_->calibration(); }
@@ -89,7 +95,7 @@ class Tracker {
  private:
   /// `adjusted`: the setup's camera if its numbers are estimated, else null.
   Tracker(const TrackerSetup& setup, const TrackerConfig& config, const StartState& start, StageClock clock,
-          std::shared_ptr<AdjustedCamera> adjusted);
+          std::shared_ptr<AdjustedCamera> adjusted, std::unique_ptr<BackEnd> fusion);
 
   void make_due_updates();
   void make_update();

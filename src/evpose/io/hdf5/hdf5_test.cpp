@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <atomic>
 #include <random>
+#include <thread>
 
 #include "evpose/io/files/test_files.h"
 #include "evpose/io/hdf5/ecf.h"
@@ -58,6 +60,23 @@ TEST(Hdf5, AFileWhoseContentCannotBeListedIsRefused) {
   const auto file = Hdf5File::open(folder.file("b.h5", bytes));
   ASSERT_FALSE(file.ok());
   EXPECT_TRUE(says(file.error().line(), {"b.h5", "damaged", "copy it again"}));
+}
+
+TEST(Hdf5, AFileIsTriedWhileAnotherThreadReads) {
+  const TemporaryFolder folder;
+  ForeignFile written(folder / "a.h5");
+  written.put("/x", H5T_NATIVE_DOUBLE, std::vector<double>(1000, 1.0));
+  written.close();
+  const std::string bytes = content_of(folder / "a.h5");
+  const Hdf5File read = Hdf5File::open(folder / "a.h5").value();
+  std::atomic<bool> done = false;
+  std::thread reader([&] {
+    while (!done) read.has("/x");
+  });
+  // A child that is born while the library is locked waits forever: then this test never ends.
+  for (int i = 0; i < 40; ++i) EXPECT_TRUE(Hdf5File::open(folder.file(text("b", i, ".h5"), bytes)).ok()) << i;
+  done = true;
+  reader.join();
 }
 
 TEST(Hdf5, AttributesBeyondTheirMessagesAreDamage) {

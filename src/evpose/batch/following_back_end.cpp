@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/batch/following_back_end.h"
+
+#include <algorithm>
+#include <array>
+
+#include "evpose/core/error.h"
+#include "evpose/fusion/calibration_states.h"
+
+namespace evpose {
+namespace {
+
+using namespace error_state;
+
+/// Of biases that are found anew: any IMU.
+constexpr double kAnyGyroBias_rad_s = 1, kAnyAccelBias_m_s2 = 3;
+
+}  // namespace
+
+FollowingBackEnd::FollowingBackEnd(const StatePropagator& propagator, std::span<const FusionState> trajectory,
+                                   const Pose& T_body_cam, StaticParameters& parameters, ChainSmoother& chain)
+    : BackEnd(propagator),
+      trajectory_(trajectory),
+      T_body_cam_(T_body_cam),
+      parameters_(parameters),
+      chain_(chain) {
+  EVPOSE_CHECK(!trajectory.empty());
+}
+
+void FollowingBackEnd::start(const FusionState& first) {
+  if (next_ > 0) {
+    predicted_.covariance.diagonal().segment<3>(kBg).array() += kAnyGyroBias_rad_s * kAnyGyroBias_rad_s;
+    predicted_.covariance.diagonal().segment<3>(kBa).array() += kAnyAccelBias_m_s2 * kAnyAccelBias_m_s2;
+    return;
+  }
+  EVPOSE_CHECK(first.t == trajectory_.front().t);
+  chain_.start(first.minus(trajectory_.front()), first.covariance);
+  state_ = predicted_ = trajectory_.front();
+  predicted_.covariance.setZero();
+  next_ = 1;
+}
+
+void FollowingBackEnd::predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) {
+  Matrix15d transition;
+  propagator().propagate(predicted_, a, b, trust, &transition);
+  add_step(transition, to_seconds(b.t - a.t));
+}
+
+void FollowingBackEnd::predict(TimeNs t) {
+  const double dt_s = to_seconds(t - predicted_.t);
+  Matrix15d transition;
+  propagator().propagate(predicted_, t, &transition);
+  add_step(transition, dt_s);
+}
+
+void FollowingBackEnd::add_step(const Matrix15d& transition, double dt_s) {
+  transition_ = (transition * transition_).eval();
+  if (parameters_.places().gravity)
+    by_tilt_ = (transition * by_tilt_).eval() + state_by_gravity_tilt(propagator().gravity_map(), dt_s);
+  const Matrix15d known = state_.covariance;
+  state_ = predicted_;
+  state_.covariance = known;
+  if (next_ < trajectory_.size() && predicted_.t >= trajectory_[next_].t) arrive();
+}
+
+/// At a state of the trajectory: what the IMU says of the step from the last one.
+void FollowingBackEnd::arrive() {
+  const FusionState& here = trajectory_[next_];
+  EVPOSE_CHECK(predicted_.t == here.t);
+  // A noise of nothing at all would make a step that can never be corrected.
+  constexpr double kLeast = 1e-9;
+  Matrix15d noise = predicted_.covariance;
+  noise.diagonal().array() += kLeast * kLeast;
+  const Vector15d difference = here.minus(predicted_);
+  // The error of the attitude refers to the trajectory's axes, the prediction's to its own.
+  Matrix15d turn = Matrix15d::Identity();
+  turn.block<3, 3>(kPhi, kPhi) = so3::right_jacobian(difference.segment<3>(kPhi));
+  Eigen::MatrixXd by_parameters(15, 0);
+  if (const auto place = parameters_.places().gravity) {
+    by_parameters.setZero(15, *place + 2);
+    by_parameters.rightCols<2>() = turn * by_tilt_;
+  }
+  chain_.move(turn * transition_, turn * difference, turn * noise * turn.transpose(), by_parameters);
+  const Eigen::Vector3d angular_rate = predicted_.angular_rate;
+  state_ = predicted_ = here;
+  state_.angular_rate = predicted_.angular_rate = angular_rate;
+  predicted_.covariance.setZero();
+  transition_.setIdentity();
+  by_tilt_.setZero();
+  ++next_;
+}
+
+/// What single contours say of parameters beside the pose.
+void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
+  const Eigen::Matrix3d R = state_.nav.T_map_body.rotation();
+  std::array<BlockRow, 2> rows;
+  for (const ContourOffset& contour : contours) {
+    std::size_t n = 0;
+    double residual = contour.offset_px;
+    const auto add = [&](int block, int place, const BlockRow::Derivative& derivative) {
+      if (static_cast<std::size_t>(block) >= places_.size())
+        places_.resize(static_cast<std::size_t>(block) + 1);
+      places_[static_cast<std::size_t>(block)] = place;
+      rows[n++] = {static_cast<BlockId>(block), derivative};
+    };
+    const Eigen::Vector3d across = R * contour.across_body;
+    if (const double length = across.norm(); parameters_.estimates_segments() && length > 0) {
+      const auto& segment = parameters_.segment(contour, across / length);
+      const double by_offset = -across.dot(segment.across_map);
+      add(1 + segment.place, segment.place, BlockRow::Derivative::Constant(1, by_offset));
+      residual -= by_offset * segment.offset_m;
+    }
+    if (const auto place = parameters_.places().intrinsics;
+        place && contour.by_intrinsics.size() == parameters_.intrinsics_count())
+      add(0, *place, contour.by_intrinsics);
+    if (n > 0)
+      measurement_.add({contour.by_pose(R), contour.weight, residual, contour.offset_px, {rows.data(), n}});
+  }
+}
+
+/// What an error of the time offset does to the seen pose. The rate is that of the trajectory over a while:
+/// the gyroscope's noise is that of the predictions as well, and a derivative that knew it would pull the
+/// offset to one side.
+Vector6d FollowingBackEnd::seen_pose_by_time() const {
+  constexpr TimeNs kToEachSide = 25 * kNsPerMs;
+  auto before = trajectory_.begin() + static_cast<std::ptrdiff_t>(next_ - 1), after = before;
+  while (before != trajectory_.begin() && state_.t - before->t < kToEachSide) --before;
+  while (after + 1 != trajectory_.end() && after->t - state_.t < kToEachSide) ++after;
+  FusionState state = state_;
+  if (const double dt_s = to_seconds(after->t - before->t); dt_s > 0)
+    state.angular_rate = so3::log(before->nav.T_map_body.q.conjugate() * after->nav.T_map_body.q) / dt_s;
+  return seen_pose_by_time_offset(state);
+}
+
+/// The measurement, of the seen pose and of blocks, as one of the pose and of parameters.
+ChainMeasurement FollowingBackEnd::by_parameters() const {
+  const StaticParameters::Places& at = parameters_.places();
+  std::vector<std::pair<int, Vector6d>> shifts;
+  const auto add = [&](int place, const auto& columns) {
+    for (int i = 0; i < columns.cols(); ++i) shifts.emplace_back(place + i, columns.col(i));
+  };
+  if (at.time) add(*at.time, seen_pose_by_time());
+  if (at.rotation) add(*at.rotation, seen_pose_by_rotation(state_, T_body_cam_.p));
+  if (at.translation) add(*at.translation, seen_pose_by_translation(state_));
+
+  ChainMeasurement out;
+  const auto shifted = static_cast<Eigen::Index>(shifts.size());
+  const Eigen::Index blocks = measurement_.size() - 6, all = 6 + shifted + blocks;
+  Eigen::MatrixXd by_shifts(6, shifted);  // of the seen pose
+  for (Eigen::Index i = 0; i < shifted; ++i) {
+    out.parameters.push_back(shifts[static_cast<std::size_t>(i)].first);
+    by_shifts.col(i) = shifts[static_cast<std::size_t>(i)].second;
+  }
+  for (const JointMeasurement::Block& block : measurement_.blocks())
+    for (int i = 0; i < block.size; ++i)
+      out.parameters.push_back(places_[static_cast<std::size_t>(block.id)] + i);
+  const auto H = measurement_.information();
+  const auto pose = H.topLeftCorner<6, 6>();
+  const auto mixed = H.topRightCorner(6, blocks);
+  const Eigen::Matrix<double, 6, Eigen::Dynamic> pose_shifts = pose * by_shifts;
+  out.information.resize(all, all);
+  out.information << pose, pose_shifts, mixed,  //
+      pose_shifts.transpose(), by_shifts.transpose() * pose_shifts, by_shifts.transpose() * mixed,
+      mixed.transpose(), mixed.transpose() * by_shifts, H.bottomRightCorner(blocks, blocks);
+  const auto b = measurement_.vector();
+  out.vector.resize(all);
+  out.vector << b.head<6>(), by_shifts.transpose() * b.head<6>(), b.tail(blocks);
+  return out;
+}
+
+void FollowingBackEnd::update(const PoseInformation& measurement, std::span<const ContourOffset> contours) {
+  if (state_.t != trajectory_[next_ - 1].t) return;  // after the trajectory's end
+  measurement_.start(measurement);
+  if (takes_contours()) add_contours(contours);
+  chain_.measure(by_parameters());
+}
+
+Eigen::MatrixXd FollowingBackEnd::seen_covariance() const {
+  const Eigen::Index size = 9 + parameters_.intrinsics_count();
+  return Eigen::MatrixXd::Zero(size, size);
+}
+
+Calibration FollowingBackEnd::calibration() const {
+  Calibration out;
+  out.frozen = false;
+  out.intrinsics.setZero(parameters_.intrinsics_count());
+  out.intrinsics_sigma = out.intrinsics;
+  return out;
+}
+
+}  // namespace evpose

@@ -65,7 +65,7 @@ class ChainSmoother {
     Eigen::MatrixXd moved_by_parameters{15, 0};
   };
 
-  void grow(Eigen::Index parameters);
+  void grow(Eigen::Index n);
   void add_gathered();
 
   Vector15d mean_ = Vector15d::Zero();

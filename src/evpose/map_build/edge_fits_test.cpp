@@ -137,5 +137,28 @@ TEST(EdgeProfileFit, PointsThatLeanAlongTheirRaysAreNoFace) {
     }
 }
 
+/// Few points of one scan line, gaps, steep faces: whatever a cloud has at its rim.
+std::vector<Eigen::Vector3d> scraps(std::mt19937& random) {
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::vector<Eigen::Vector3d> points;
+  const double thickness = std::pow(10, -2 + 2 * unit(random)), lean = unit(random);
+  const int count = 10 + static_cast<int>(random() % 60);
+  for (int i = 0; i < count; ++i) {
+    const double across = 0.05 * unit(random);
+    points.emplace_back(0.5 * unit(random), across, lean * across + thickness * unit(random));
+  }
+  return points;
+}
+
+TEST(EdgeProfileFit, SaysNothingOrHasFiniteSigmas) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 3000; ++trial) {
+    const double noise_m = 0.02 * std::pow(10, -static_cast<double>(random() % 5));
+    const EdgeProfileFit fit =
+        fit_edge_profile(scraps(random), edge_profile_window(0.5, noise_m, noise_m, 0.03));
+    EXPECT_TRUE(std::isfinite(fit.sigma_place + fit.sigma_height + fit.sigma_depth)) << trial;
+  }
+}
+
 }  // namespace
 }  // namespace evpose::map_build

@@ -5,7 +5,7 @@ import statistics
 
 import tables
 
-UNSEEN = 20
+UNSEEN = 4
 FIGURES = {"ate_mean_mm": "ATE mm", "are_mean_deg": "ARE deg", "velocity_rmse_mm_s": "velocity mm/s", "nees6_mean": "NEES/6"}
 DIGITS = {"ate_mean_mm": 2, "are_mean_deg": 3, "velocity_rmse_mm_s": 1, "nees6_mean": 2}
 

@@ -25,7 +25,7 @@ constexpr double kHeld = 1e12;             // factor on the prior's information 
 // Chance gives no concentration at all, a wrong view some. How much the right one gives depends on the
 // texture beside the contours. So much is the right one's:
 constexpr double kHighConcentration = 0.38;
-// With less, most begins have to lead to one view, and its contours have to have events.
+// With less, most starting points have to lead to one view, and its contours have to have events.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2;         // sigma
 constexpr double kEdge_m = 0.6;         // an edge whose events share errors

@@ -29,9 +29,9 @@ struct SeenPrior {
 /// again, at their own times and under gates that close from several pixels to the tracker's (graduated
 /// non-convexity), for the pose, the velocity and the camera's numbers together. This begins at several poses
 /// (search_pose()), once with the numbers free and once with the pose alone at first; what gathers most
-/// events at the contours is taken, if they are many or most starting points lead there. Errors that the events of one
-/// edge share are eliminated with a variance of their own for each edge (Student-t), so that the covariance
-/// is one that single disturbed edges do not mislead.
+/// events at the contours is taken, if they are many or most starting points lead there. Errors that the
+/// events of one edge share are eliminated with a variance of their own for each edge (Student-t), so that
+/// the covariance is one that single disturbed edges do not mislead.
 class StartAlignment {
  public:
   /// Worth its time where contours are expected to lie further off than this, px (root mean square).

@@ -69,7 +69,7 @@ class RenderTest(unittest.TestCase):
         self.assertIn("4 pictures", self.render("frames", "--fps", "10", "--start", "0.1", "--duration", "0.3"))
         files = sorted((self.root / "frames").iterdir())
         self.assertEqual([f.name for f in files], [f"frame_{k:05d}.png" for k in range(4)])
-        pixels = read_png(files[2])
+        pixels = read_png(files[0])
         self.assertEqual(pixels.shape, (max(480, SCALE * HEIGHT), SCALE * WIDTH + 400, 3))
         overlay, panel = pixels[:SCALE * HEIGHT, :SCALE * WIDTH], pixels[:, SCALE * WIDTH:]
         red, green, blue = np.moveaxis(overlay, -1, 0)

@@ -63,7 +63,7 @@ std::vector<std::string> encoder_command(const FilmFrames& frames, double fps, b
     add({"-filter_complex", "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none", "-f",
          "gif"});
   else
-    add({"-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"});
+    add({"-c:v", "libx264", "-crf", "26", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"});
   add({"-threads", "2", "-fflags", "+bitexact", "-flags:v", "+bitexact", path});
   return out;
 }

@@ -147,10 +147,11 @@ void FilmFrames::State::draw_time(Pen& pen) const {
   pen.size(11);
   pen.colour(kFaint);
   pen.text(left(), strip_top() + 8, "position sigma, 0.1 mm to 1 m, and health over the run");
-  for (std::size_t i = 0; i + 1 < run.rows.size(); ++i) {
+  for (std::size_t i = 0, end = 0; i + 1 < run.rows.size(); i = end) {  // stretches of one health
+    while (end + 1 < run.rows.size() && run.rows[end].health == run.rows[i].health) ++end;
     pen.colour(colour_of(run.rows[i].health));
     const double x = time_x(run.rows[i].t);
-    pen.box(x, height - 28, time_x(run.rows[i + 1].t) - x + 0.3, 10);
+    pen.box(x, height - 28, time_x(run.rows[end].t) - x, 10);
   }
   pen.colour(kInk);
   bool drawing = false;

@@ -177,7 +177,7 @@ Expected<RunMessages> write_run_mcap(const std::string& path, const RunFiles& ru
     pictures.emplace(*std::move(opened));
   else
     counts.without = opened.error().line();
-  auto file = create_mcap(path, Compression::lz4);
+  auto file = create_mcap(path, Compression::none);  // pictures, most of it, are packed already
   if (!file) return file.error();
   RunWriter writer(*std::move(file));
   if (const auto map = read_run_map(run)) writer.put_map(run.rows.front().t, *map, &counts);

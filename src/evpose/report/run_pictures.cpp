@@ -95,10 +95,12 @@ Expected<ContourMap> read_run_map(const RunFiles& run) {
 }
 
 Expected<RunPictures> RunPictures::open(const RunFiles& run) {
-  auto map = read_run_map(run);
-  if (!map) return map.error();
+  if (run.input.recording.empty())
+    return Error{run.folder, "does not say what it was made from", "give a run of evpose track"};
   const auto recording = open_recording(run.input.recording, run.calibration);
   if (!recording) return recording.error();
+  auto map = read_run_map(run);
+  if (!map) return map.error();
   auto camera = make_camera(recording->camera);
   if (!camera) return camera.error();
   auto state = std::make_unique<State>(*recording, std::move(*map), std::move(*camera));

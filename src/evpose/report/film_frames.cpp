@@ -121,6 +121,7 @@ struct FilmFrames::State {
   void draw_background(const ContourMap& map);
   void draw_time(Pen& pen) const;
   void draw_words(Pen& pen, std::size_t row) const;
+  void draw_reason(Pen& pen, const RunRow& row, double y) const;
   void draw_way(Pen& pen, std::size_t row) const;
   double event_rate_mev_s(std::size_t row) const;
   void copy_overlay(const RgbImage& overlay, cairo_surface_t* to) const;
@@ -211,11 +212,15 @@ void FilmFrames::State::draw_words(Pen& pen, std::size_t number) const {
   double y = 62;
   for (std::size_t i = 0; i < lines.size(); ++i, y += kLine)
     if (row.valid() || i >= 4) pen.text(left(), y, lines[i]);
+  draw_reason(pen, row, y + 4);
+}
+
+void FilmFrames::State::draw_reason(Pen& pen, const RunRow& row, double y) const {
   pen.size(12);
   pen.colour(colour_of(row.health));
   std::string reason = row.reason;
   while (!reason.empty() && pen.width_of(reason) > right() - left()) reason.pop_back();
-  pen.text(left(), y + 4, reason);
+  pen.text(left(), y, reason);
 }
 
 void FilmFrames::State::draw_way(Pen& pen, std::size_t number) const {

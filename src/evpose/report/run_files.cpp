@@ -46,6 +46,22 @@ RunRow run_row(CsvRow& row, bool* known) {
   return out;
 }
 
+Expected<std::vector<RunRow>> read_rows(const std::string& path) {
+  const auto content = read_text_file(path, kMostBytes);
+  if (!content) return content.error();
+  const CsvTable table(*content);
+  std::vector<RunRow> out;
+  for (std::size_t i = 0; i < table.rows.size(); ++i) {
+    CsvRow row(table, table.rows[i]);
+    bool known = true;
+    out.push_back(run_row(row, &known));
+    if (!row.sound() || !known)
+      return Error{path, text("line ", i + 2, " is not as evpose writes it"), "give a complete run folder"};
+  }
+  if (out.empty()) return Error{path, "no poses", "give a run that tracked something"};
+  return out;
+}
+
 Expected<RunInput> read_input(const std::string& path) {
   const auto content = read_text_file(path, kMostBytes);
   if (!content) return content.error();
@@ -91,18 +107,9 @@ Expected<RunFiles> read_run_files(const std::string& folder) {
   out.calibration = folder + "/calibration.yaml";
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(out.calibration, ignored)) out.calibration = out.input.calibration;
-  const std::string path = folder + "/states.csv";
-  const auto content = read_text_file(path, kMostBytes);
-  if (!content) return content.error();
-  const CsvTable table(*content);
-  for (std::size_t i = 0; i < table.rows.size(); ++i) {
-    CsvRow row(table, table.rows[i]);
-    bool known = true;
-    out.rows.push_back(run_row(row, &known));
-    if (!row.sound() || !known)
-      return Error{path, text("line ", i + 2, " is not as evpose writes it"), "give a complete run folder"};
-  }
-  if (out.rows.empty()) return Error{path, "no poses", "give a run that tracked something"};
+  auto rows = read_rows(folder + "/states.csv");
+  if (!rows) return rows.error();
+  out.rows = *std::move(rows);
   return out;
 }
 

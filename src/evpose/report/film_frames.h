@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "evpose/camera/camera.h"
 #include "evpose/map/contour_map.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/run_files.h"

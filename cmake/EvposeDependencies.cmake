@@ -23,6 +23,11 @@ foreach(library lz4 lzf zstd blosc)  # no CMake packages in Debian 12
   target_link_libraries(evpose_${library} INTERFACE ${EVPOSE_${library}_LIBRARY})
   set_target_properties(evpose_${library} PROPERTIES EXPORT_NAME ${library})
 endforeach()
+find_path(EVPOSE_cairo_INCLUDE cairo.h PATH_SUFFIXES cairo REQUIRED)
+find_library(EVPOSE_cairo_LIBRARY cairo REQUIRED)
+add_library(evpose_cairo INTERFACE)
+target_include_directories(evpose_cairo SYSTEM INTERFACE ${EVPOSE_cairo_INCLUDE})
+target_link_libraries(evpose_cairo INTERFACE ${EVPOSE_cairo_LIBRARY})
 # Headers only; its own CMake file asks for more of them than Debian installs elsewhere.
 find_path(EVPOSE_nanoflann_INCLUDE nanoflann.hpp REQUIRED)
 add_library(evpose_nanoflann INTERFACE)

@@ -23,6 +23,8 @@ if(TARGET evpose_io)
 endif()
 if(TARGET evpose)
   install(TARGETS evpose)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/evpose)
+  install(FILES ${PROJECT_SOURCE_DIR}/web/foxglove/evpose.json DESTINATION ${CMAKE_INSTALL_DATADIR}/evpose/foxglove)
 endif()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/evpose-config.cmake.in

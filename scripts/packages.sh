@@ -17,6 +17,7 @@ build=(
   libcli11-dev         # command line
   nlohmann-json3-dev   # summary.json
   libpng-dev           # pictures in the report and in recordings
+  libcairo2-dev        # lines and words in films of a run
   libbz2-dev liblz4-dev libzstd-dev libblosc-dev liblzf-dev  # compressed bags, recordings, clouds and data sets
   zlib1g-dev           # checksums of bags and maps
   libsqlite3-dev       # ROS 2 bags
@@ -40,6 +41,7 @@ test=(
   libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev  # the ROS node
   python3-rosmaster python3-rospy python3-sensor-msgs python3-nav-msgs python3-geometry-msgs python3-diagnostic-msgs
   python3-tf2-msgs     # drive it
+  ffmpeg               # encodes films of a run
   clang-14 libclang-rt-14-dev  # fuzzing
   chromium             # draws the report
   clang-format-14      # pinned: each version formats differently

@@ -11,6 +11,7 @@
 #include "evpose/core/log.h"
 #include "evpose/io/formats/event_formats.h"
 #include "evpose/io/motion/imu_axes.h"
+#include "evpose/io/recording/clock_offset.h"
 #include "evpose/io/recording/dataset_layouts.h"
 #include "evpose/io/recording/event_survey.h"
 #include "evpose/io/recording/imu_survey.h"
@@ -28,6 +29,10 @@ constexpr std::int64_t kFewestEvents = 1000;
 constexpr double kOneSign = 0.02;        // share of the rarer polarity
 constexpr double kLongestLever_m = 0.5;  // between IMU and camera of one rig
 constexpr double kLongestTimeshift_s = 0.1;
+// Translation makes events, too: only much better agreement, and an offset beyond that, says that clocks are
+// wrong.
+constexpr double kClockError_s = 0.05;
+constexpr double kClockLead = 0.2;
 
 std::string name_of(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
@@ -89,6 +94,50 @@ std::string faster_imu(const std::string& path) {
   return "raise the rate of the IMU's driver to 200 Hz or more, and record again";
 }
 
+void check_events(Checklist& list, const Recording& r, const EventSummary& events) {
+  const double share_on =
+      events.count == 0 ? 0 : static_cast<double>(events.on) / static_cast<double>(events.count);
+  if (events.count < kFewestEvents)
+    list.problem("events",
+                 {r.events_path, text("only ", events.count, " events"), "record motion, in light"});
+  else if (std::min(share_on, 1 - share_on) < kOneSign)
+    list.problem("events", {r.events_path, text(std::round(100 * share_on), " % of the events are on events"),
+                            "check the biases of the sensor, and the column of the polarity"});
+  else
+    list.ok("events",
+            text(fixed(1e-6 * static_cast<double>(events.count), 2), " million in ",
+                 fixed(events.duration_s(), 2), " s, ", fixed(1e-6 * events.mean_rate(), 2), " Mev/s"));
+  if (events.hot_count > 0)
+    list.note("events", text(events.hot_count, " hot pixels: the tracker masks them"));
+}
+
+/// What joins two clocks, said in the recording.
+std::string joining_words(const Recording& r, const ClockOffset& found) {
+  const double set_s = to_seconds(r.event_options.offset_ns) - r.timeshift_cam_imu_s + found.offset_s;
+  return text("set time: {offset_events_s: ", fixed(set_s, 3),
+              "} in recording.yaml: then events come when the IMU turns (correlation ",
+              fixed(found.correlation, 2),
+              "); good to 10 ms: state timeshift_sigma: 0.01 in the calibration");
+}
+
+/// Streams on one clock, as far as is known: the events without IMU.
+void check_common_time(Checklist& list, const CheckedRecording& data, const EventSummary& events,
+                       const std::optional<ClockOffset>& offset) {
+  const Recording& r = data.recording;
+  const double outside_s = events.duration_s() - to_seconds(std::min(events.last, data.imu.back().t) -
+                                                            std::max(events.first, data.imu.front().t));
+  const std::string words =
+      text(fixed(outside_s, 2), " s of ", fixed(events.duration_s(), 2), " s of events have no IMU");
+  if (outside_s > kMostOutside * events.duration_s() && outside_s > kWorthTelling_s)
+    list.problem("clocks", {r.imu_path, words,
+                            "set time.offset_events_s in recording.yaml, or record both throughout"});
+  else if (outside_s > kWorthTelling_s)
+    list.note("clocks", words + ": they are left out");
+  else
+    list.ok("clocks", text("events and IMU overlap, ", span_text({r.first_ns, r.last_ns}),
+                           offset ? "; events come when the IMU turns" : ""));
+}
+
 /// Everything that can be said without a map.
 void check_recording(Checklist& list, const CheckedRecording& data) {
   check_clocks(list, data);
@@ -101,7 +150,7 @@ int check(const TrackRequest& request) {
   if (!found) return bad_input(found.error());
   Checklist list;
   CheckedRecording data;
-  const auto recording = open_recording(request.recording, request.calibration);
+  const auto recording = open_unjoined_recording(request.recording, request.calibration);
   if (recording) {
     data.recording = *recording;
     if (auto camera = make_camera(recording->camera)) data.camera = *camera;
@@ -124,7 +173,7 @@ int check(const TrackRequest& request) {
     for (const char* thing : {"clocks", "IMU", "calibration"}) list.skipped(thing);
   }
   const auto map = check_map(list, request, data.recording);
-  if (recording && map)
+  if (recording && map && !data.recording.clocks_apart)
     check_start(list, request, data, *map);
   else
     list.skipped("start");
@@ -138,35 +187,25 @@ int check(const TrackRequest& request) {
 }  // namespace
 
 void check_clocks(Checklist& list, const CheckedRecording& data) {
-  const Recording& r = data.recording;
-  const auto events = survey_events(r);
+  const auto events = survey_events(data.recording);
   if (!events) return list.problem("events", events.error());
-  const double share_on =
-      events->count == 0 ? 0 : static_cast<double>(events->on) / static_cast<double>(events->count);
-  if (events->count < kFewestEvents)
-    list.problem("events",
-                 {r.events_path, text("only ", events->count, " events"), "record motion, in light"});
-  else if (std::min(share_on, 1 - share_on) < kOneSign)
-    list.problem("events", {r.events_path, text(std::round(100 * share_on), " % of the events are on events"),
-                            "check the biases of the sensor, and the column of the polarity"});
-  else
-    list.ok("events",
-            text(fixed(1e-6 * static_cast<double>(events->count), 2), " million in ",
-                 fixed(events->duration_s(), 2), " s, ", fixed(1e-6 * events->mean_rate(), 2), " Mev/s"));
-  if (events->hot_count > 0)
-    list.note("events", text(events->hot_count, " hot pixels: the tracker masks them"));
+  check_events(list, data.recording, *events);
   if (data.imu.empty()) return;
-  const double outside_s = events->duration_s() - to_seconds(std::min(events->last, data.imu.back().t) -
-                                                             std::max(events->first, data.imu.front().t));
-  const std::string words =
-      text(fixed(outside_s, 2), " s of ", fixed(events->duration_s(), 2), " s of events have no IMU");
-  if (outside_s > kMostOutside * events->duration_s() && outside_s > kWorthTelling_s)
-    list.problem("clocks", {r.imu_path, words,
-                            "set time.offset_events_s in recording.yaml, or record both throughout"});
-  else if (outside_s > kWorthTelling_s)
-    list.note("clocks", words + ": they are left out");
+  const auto offset = find_clock_offset(*events, data.imu);
+  if (data.recording.clocks_apart) {
+    Error apart = *data.recording.clocks_apart;
+    if (offset) apart.fix = joining_words(data.recording, *offset);
+    return list.problem("clocks", apart);
+  }
+  const bool wrong = offset && std::abs(offset->offset_s) > kClockError_s &&
+                     offset->correlation > offset->as_read + kClockLead;
+  if (wrong)
+    list.problem("clocks", {data.recording.imu_path,
+                            text("the events do not come when the IMU turns (correlation ",
+                                 fixed(offset->as_read, 2), "), but would on another clock"),
+                            joining_words(data.recording, *offset)});
   else
-    list.ok("clocks", "events and IMU overlap, " + span_text({r.first_ns, r.last_ns}));
+    check_common_time(list, data, *events, offset);
 }
 
 void check_imu(Checklist& list, const CheckedRecording& data) {

@@ -30,6 +30,7 @@ void add_convert(CLI::App& app, std::function<int()>& run);
 void add_info(CLI::App& app, std::function<int()>& run);
 void add_serve(CLI::App& app, std::function<int()>& run);
 void add_view(CLI::App& app, std::function<int()>& run);
+void add_render(CLI::App& app, std::function<int()>& run);
 void add_mavlink(CLI::App& app, std::function<int()>& run);
 void add_manual(CLI::App& app, std::function<int()>& run);
 void add_bench(CLI::App& app, std::function<int()>& run);

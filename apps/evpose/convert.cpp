@@ -14,6 +14,7 @@
 #include "evpose/io/motion/trajectory.h"
 #include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/io/recording/recording.h"
+#include "evpose/report/run_messages.h"
 #include "input_kind.h"
 #include "interrupt.h"
 
@@ -60,8 +61,23 @@ Expected<int> convert_events_of_recording(ConvertRequest request) {
   return convert_events(request);
 }
 
+/// Foxglove's view of a run.
+Expected<int> convert_run(const ConvertRequest& request) {
+  if (!request.output.ends_with(".mcap"))
+    return Error{request.output, "a run cannot be written so", "use an output that ends in .mcap"};
+  const auto run = read_run_files(request.input);
+  if (!run) return run.error();
+  const auto written = write_run_mcap(request.output, *run);
+  if (!written) return written.error();
+  std::printf("%s: %zu poses, %zu map points, %zu pictures\n", request.output.c_str(), written->poses,
+              written->map_points, written->pictures);
+  if (!written->without.empty()) std::printf("without pictures: %s\n", written->without.c_str());
+  return 0;
+}
+
 Expected<int> convert(const ConvertRequest& request) {
   if (auto status = check_output(request); !status) return status.error();
+  if (is_run_folder(request.input)) return convert_run(request);
   const auto kind = kind_of_input(request.input);
   if (!kind) return kind.error();
   switch (*kind) {
@@ -163,14 +179,15 @@ Expected<int> convert_calibration(const ConvertRequest& request) {
 
 void add_convert(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand(
-      "convert", "Write events, recordings, trajectories or calibrations in another format");
+      "convert", "Write events, recordings, trajectories, calibrations or runs in another format");
   auto request = std::make_shared<ConvertRequest>();
   ConvertRequest& r = *request;
   command->add_option("input", r.input, "anything that evpose info knows, but maps")->required();
   command
       ->add_option("output", r.output,
                    "by its ending: .h5, .raw (EVT3), .txt, .csv: events; .tum, .txt: trajectory; .csv: IMU; "
-                   ".yaml: calibration as Kalibr's; without ending: recording folder")
+                   ".yaml: calibration as Kalibr's; .mcap: bag, of a run for Foxglove; without ending: "
+                   "recording folder")
       ->required();
   const auto seconds = CLI::Range(-4e9, 4e9);
   command->add_option("--start", r.start_s, "leave out what is earlier; from the first stamp [s]")

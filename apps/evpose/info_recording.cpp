@@ -60,8 +60,9 @@ void describe_parts(Sheet& sheet, const FoundRecording& found) {
     else
       sheet.find(span.error());
   }
-  if (!imu_path.empty() && imu_path == event_path) {
-    const auto span = describe_sensors(sheet, event_path);
+  const bool is_text = imu_path.ends_with(".csv") || imu_path.ends_with(".txt");
+  if (!imu_path.empty() && !is_text) {  // a bag, or an autopilot's log
+    const auto span = describe_sensors(sheet, imu_path);
     if (span)
       imu = *span;
     else
@@ -131,10 +132,11 @@ Status describe_recording(Sheet& sheet, const std::string& path) {
   sheet.row("name", found->files.name, "name", found->files.name);
   list_files(sheet, *found);
   for (const Error& missing : found->missing) sheet.find(missing);
-  const auto recording = open_recording(path);
-  sheet.row("ready", recording ? "yes: evpose track takes it" : "no, see the findings", "ready",
-            recording.ok());
+  const auto recording = open_unjoined_recording(path);
+  const bool ready = recording && !recording->clocks_apart;
+  sheet.row("ready", ready ? "yes: evpose track takes it" : "no, see the findings", "ready", ready);
   if (recording) {
+    if (recording->clocks_apart) sheet.find(*recording->clocks_apart);
     describe_opened(sheet, *found, *recording);
   } else {
     const auto& e = recording.error();

@@ -35,6 +35,7 @@ int run_program(int argc, char** argv) {
   add_convert(app, run);
   add_serve(app, run);
   add_view(app, run);
+  add_render(app, run);
   add_mavlink(app, run);
   add_bench(app, run);
   add_manual(app, run);

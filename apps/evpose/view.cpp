@@ -43,8 +43,8 @@ int view(const ViewRequest& request) {
       "/history.json", "application/json",
       history_json("run", std::filesystem::absolute(request.run).lexically_normal().filename().string(),
                    *rows));
-  std::fprintf(stderr, "evpose: open %s in a browser; Ctrl-C ends\n", (*server)->address().c_str());
   const InterruptGuard guard;
+  std::fprintf(stderr, "evpose: open %s in a browser; Ctrl-C ends\n", (*server)->address().c_str());
   while (!InterruptGuard::interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   return 0;
 }

@@ -72,10 +72,15 @@ class CheckTest(unittest.TestCase):
         self.assertEqual((result.returncode, result.stdout), (2, ""))
 
     def test_a_recording_that_cannot_be_opened_is_a_problem_and_the_map_is_checked(self):
-        self.recording.imu_t_ns += 20_000_000_000
-        said = self.broken("recording", "overlap", "time.offset_events_s")
+        self.recording.calibration = self.recording.calibration.replace("distortion_model: none", "distortion_model: fish")
+        said = self.broken("recording", "distortion_model", "radtan|Kalibr|calibrate")
         self.assertRegex(said, re.compile(r"^skipped +clocks", re.MULTILINE))
         self.assertRegex(said, re.compile(r"^ok +map", re.MULTILINE))
+
+    def test_clocks_that_do_not_overlap(self):
+        self.recording.imu_t_ns += 20_000_000_000
+        said = self.broken("clocks", "overlap", "time.offset_events_s")
+        self.assertRegex(said, re.compile(r"^ok +IMU rate", re.MULTILINE))
 
     def test_mixed_axes(self):
         self.recording.imu[:, 3:] = self.recording.imu[:, [5, 4, 3]]

@@ -60,6 +60,7 @@ OUTSIDE = [
     ("libpng", r"png\.h", {"io"}),
     ("compressors", r"(bzlib|lz4|lz4frame|lzf|zstd|blosc|zlib)\.h", {"io"}),
     ("SQLite", r"sqlite3\.h", {"io"}),
+    ("Cairo", r"cairo\.h", {"report"}),
     ("nanoflann", r"nanoflann", {"map_build"}),
     ("Embree", r"embree3/", {"sim"}),
     ("assimp", r"assimp/", {"sim"}),

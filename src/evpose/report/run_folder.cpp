@@ -83,9 +83,20 @@ struct RunFolder::State {
     fs::remove_all(folder, ignored);
   }
   std::string file(const char* name) const { return (folder / name).string(); }
+  /// The user knows the folder by the place where it will stand.
+  Status commit_tables();
   Status write_trajectories(const Pose& T_body_cam) const;
   Status move_into_place();
 };
+
+Status RunFolder::State::commit_tables() {
+  for (auto* table : {&states, &latency, &states_imu}) {
+    if (!*table) continue;
+    if (Status done = (*table)->commit(); !done)
+      return Error{place.string(), done.error().what, done.error().fix};
+  }
+  return {};
+}
 
 Status RunFolder::State::write_trajectories(const Pose& T_body_cam) const {
   std::vector<TimedPose> body, camera;
@@ -187,10 +198,7 @@ Expected<RunOutcome> RunFolder::finish(const RunSummary& summary, const ConfigTa
   const auto write = [&](const char* name, const std::string& content) {
     return write_text_file(s.file(name), content);
   };
-  if (Status done = s.states->commit(); !done) return done.error();
-  if (Status done = s.latency->commit(); !done) return done.error();
-  if (s.states_imu)
-    if (Status done = s.states_imu->commit(); !done) return done.error();
+  if (Status done = s.commit_tables(); !done) return done.error();
   if (Status done = s.write_trajectories(summary.T_body_cam); !done) return done.error();
   if (Status done = write("config.yaml", config.to_yaml()); !done) return done.error();
   if (Status done = write("summary.json", summary_json(s.log, summary, config, out.score, out.verdict));

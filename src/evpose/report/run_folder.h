@@ -27,8 +27,14 @@ struct RunCalibration {
   CalibratedCamera given, found;
 };
 
+/// What a run was made from: absolute paths; empty: none of its own.
+struct RunInput {
+  std::string recording, map, calibration, occluders;
+};
+
 /// What a run folder is told at the end, beside the updates.
 struct RunSummary {
+  RunInput input;
   std::string title;                          ///< of the report, e.g. the recording's name
   std::string subtitle;                       ///< e.g. the map's name and how the run was started
   std::string start;                          ///< where the start pose came from: "started from ground truth"

@@ -93,6 +93,12 @@ Json problems_json(const RunVerdict& verdict) {
   return out;
 }
 
+Json input_json(const RunInput& input) {
+  Json out = {{"recording", input.recording}, {"map", input.map}, {"calibration", input.calibration}};
+  if (!input.occluders.empty()) out["occluders"] = input.occluders;
+  return out;
+}
+
 Json config_json(const ConfigTable& config) {
   Json out = Json::object();
   for (const ConfigTable::Value& v : config.values()) {
@@ -200,6 +206,7 @@ std::string summary_json(const StateLog& log, const RunSummary& summary, const C
   for (const Error& f : summary.findings)
     out["findings"].push_back({{"where", f.where}, {"what", f.what}, {"fix", f.fix}});
   if (!summary.start.empty()) out["start"] = summary.start;
+  if (!summary.input.recording.empty()) out["input"] = input_json(summary.input);
   if (score) {
     out["coverage"] = rounded(score->coverage);
     out["accuracy"] = accuracy_json(*score);

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 
 #include "evpose/camera/adjusted_camera.h"
@@ -230,11 +231,22 @@ std::optional<RunCalibration> calibration_of(const TrackJob& job, const Calibrat
 
 }  // namespace
 
+namespace {
+
+/// Empty stays empty.
+std::string absolute(const std::string& path) {
+  return path.empty() ? path : std::filesystem::absolute(path).lexically_normal().string();
+}
+
+}  // namespace
+
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker,
                      const Calibration& found) {
   const Recording& recording = job.recording;
   const ContourMap& map = *job.map;
   RunSummary summary;
+  summary.input = {absolute(request.recording), absolute(map.source), absolute(recording.calibration_path),
+                   absolute(request.occluders)};
   summary.title = recording.name;
   const auto name = [](const std::string& path) { return path.substr(path.find_last_of('/') + 1); };
   summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",

@@ -14,8 +14,8 @@ struct Definition {
   std::string_view type, md5, fields;
 };
 
-// Of types that are only parts of others no MD5 is needed.
-constexpr std::array<Definition, 11> kDefinitions = {{
+// Of types that are only parts of others, or only written as ROS 2 has them, no MD5 is needed.
+constexpr std::array<Definition, 21> kDefinitions = {{
     {"builtin_interfaces/Time", "", "int32 sec\nuint32 nanosec\n"},
     {"std_msgs/Header", "", "uint32 seq\ntime stamp\nstring frame_id\n"},
     {"geometry_msgs/Vector3", "", "float64 x\nfloat64 y\nfloat64 z\n"},
@@ -34,6 +34,22 @@ constexpr std::array<Definition, 11> kDefinitions = {{
      "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"},
     {"geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
      "std_msgs/Header header\ngeometry_msgs/Pose pose\n"},
+    {"geometry_msgs/PoseWithCovariance", "", "geometry_msgs/Pose pose\nfloat64[36] covariance\n"},
+    {"geometry_msgs/PoseWithCovarianceStamped", "",
+     "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"},
+    {"geometry_msgs/Transform", "", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"},
+    {"geometry_msgs/TransformStamped", "",
+     "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"},
+    {"tf2_msgs/TFMessage", "", "geometry_msgs/TransformStamped[] transforms\n"},
+    {"nav_msgs/Path", "", "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"},
+    {"sensor_msgs/PointField", "", "string name\nuint32 offset\nuint8 datatype\nuint32 count\n"},
+    {"sensor_msgs/PointCloud2", "",
+     "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\n"
+     "bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n"},
+    {"sensor_msgs/CompressedImage", "", "std_msgs/Header header\nstring format\nuint8[] data\n"},
+    {"evpose_msgs/Health", "",
+     "std_msgs/Header header\nuint8 level\nstring state\nstring reason\nfloat64 position_sigma_m\n"
+     "float64 rotation_sigma_deg\nfloat64 speed_m_s\nuint32 points\nuint32 points_matched\n"},
 }};
 
 const Definition& find(std::string_view type) {

@@ -206,7 +206,7 @@ Status complete_contours(ContourMap& map) {
     return Error{map.source,
                  text(without, " of ", all, " points have no neighbours along a contour (typical distance ",
                       spacing, " m)"),
-                 "give a map of contour points, or one with tangents"};
+                 "give a map of contour points; of a cloud of surfaces `evpose map build` makes one"};
   fill_lengths(map, positions, spacing);
   if (without > 0) {
     std::erase_if(map.points, [](const ContourPoint& p) { return p.tangent.isZero(); });

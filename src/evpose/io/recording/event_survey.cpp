@@ -9,7 +9,7 @@ namespace {
 constexpr TimeNs kShortestGap = 20 * kNsPerMs;
 constexpr double kGapInMeanDistances = 100;
 constexpr std::size_t kMostSilences = 1000;
-constexpr TimeNs kHundredth = 10 * kNsPerMs;
+constexpr TimeNs kHundredth = EventSummary::kHundredth;
 constexpr std::size_t kMostHundredths = 1u << 24;  // two days
 constexpr std::size_t kBins = 60;
 constexpr std::int64_t kHotLeast = 50, kHotTimesMedian = 30, kHotTimesNeighbour = 10;
@@ -117,6 +117,7 @@ void EventSurvey::find_bursts(EventSummary& out) const {
 EventSummary EventSurvey::finish() const {
   EventSummary out = sums_;
   if (out.count == 0) return out;
+  out.hundredths = hundredths_;
   find_hot(out);
   find_bursts(out);
   const double mean_distance = static_cast<double>(out.last - out.first) / static_cast<double>(out.count);

@@ -21,14 +21,17 @@ struct PixelCount {
 
 /// What a stream of events looks like as a whole.
 struct EventSummary {
+  static constexpr TimeNs kHundredth = 10 * kNsPerMs;
+
   std::int64_t count = 0, on = 0;
   TimeNs first = 0, last = 0;
-  int widest_x = 0, highest_y = 0;  ///< largest coordinates seen
-  std::int64_t active_pixels = 0;   ///< pixels with at least one event
-  std::int64_t most_at_once = 0;    ///< events of one microsecond
-  std::vector<std::int64_t> bins;   ///< events in equal parts of the time from `first` on
-  TimeNs bin_ns = 1;                ///< length of a bin
-  std::vector<EventGap> gaps;       ///< the longest first, at most ten
+  int widest_x = 0, highest_y = 0;        ///< largest coordinates seen
+  std::int64_t active_pixels = 0;         ///< pixels with at least one event
+  std::int64_t most_at_once = 0;          ///< events of one microsecond
+  std::vector<std::int64_t> bins;         ///< events in equal parts of the time from `first` on
+  TimeNs bin_ns = 1;                      ///< length of a bin
+  std::vector<std::uint32_t> hundredths;  ///< events of each 10 ms from `first` on
+  std::vector<EventGap> gaps;             ///< the longest first, at most ten
   std::int64_t gap_count = 0;
   std::vector<PixelCount> hot;  ///< the loudest first, at most a hundred
   std::int64_t hot_count = 0, hot_events = 0;

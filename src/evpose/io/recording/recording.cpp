@@ -18,6 +18,10 @@ namespace evpose {
 namespace {
 
 constexpr double kOtherEpoch_s = 1e8;
+constexpr const char* kJoinClocks =
+    "set time.offset_events_s in recording.yaml (`evpose check` looks for it), or correct events.time_unit "
+    "or "
+    "imu.time_unit";
 
 bool exists(const std::string& path) {
   struct stat info = {};
@@ -220,19 +224,22 @@ Status check_overlap(const Recording& r, const ImuExtent& imu, bool has_offset) 
     return Error{r.imu_path,
                  text("the IMU starts at ", in_seconds(imu.first), ", the events at ", in_seconds(r.first_ns),
                       ": different epochs, they do not overlap"),
-                 "set time.offset_events_s, or correct events.time_unit or imu.time_unit"};
+                 kJoinClocks};
   if (r.last_ns >= imu.first && r.first_ns <= imu.last) return {};
   return Error{r.imu_path,
                text("the IMU spans ", in_seconds(imu.first), " to ", in_seconds(imu.last), ", the events ",
                     in_seconds(r.first_ns), " to ", in_seconds(r.last_ns), ": they do not overlap"),
-               "set time.offset_events_s, or correct events.time_unit or imu.time_unit"};
+               kJoinClocks};
 }
 
 Status check_imu(const RecordingOverrides& overrides, Recording& r) {
   const auto imu = read_through(r);
   if (!imu) return imu.error();
   if (auto status = check_units(r, overrides, *imu); !status) return status;
-  if (auto status = check_overlap(r, *imu, overrides.offset_events_s.has_value()); !status) return status;
+  if (auto status = check_overlap(r, *imu, overrides.offset_events_s.has_value()); !status) {
+    r.clocks_apart = status.error();
+    return {};
+  }
   r.first_ns = std::max(r.first_ns, imu->first);
   r.last_ns = std::min(r.last_ns, imu->last);
   return {};
@@ -250,6 +257,12 @@ Status crop(const std::string& yaml, Recording& r) {
 }  // namespace
 
 Expected<Recording> open_recording(const std::string& path, const std::string& calibration) {
+  auto recording = open_unjoined_recording(path, calibration);
+  if (recording && recording->clocks_apart) return *recording->clocks_apart;
+  return recording;
+}
+
+Expected<Recording> open_unjoined_recording(const std::string& path, const std::string& calibration) {
   auto found = find_recording(path);
   if (!found) return found.error();
   Recording r;

@@ -48,6 +48,8 @@ struct Recording {
 
   TimeNs first_ns = 0, last_ns = 0;  ///< common span of events and IMU, inside the crop, on the IMU's clock
   std::int64_t event_count = -1;     ///< of the whole file; -1: not known
+  std::optional<Error>
+      clocks_apart;  ///< events and IMU have no time in common; see open_unjoined_recording()
 
   TimeNs groundtruth_offset_ns = 0;
   std::optional<Pose>
@@ -63,6 +65,10 @@ struct Recording {
 /// is read through once, the events are not. `calibration`: a file to use instead of the one found. Errors
 /// name the file and line.
 Expected<Recording> open_recording(const std::string& path, const std::string& calibration = "");
+
+/// The same where events and IMU may have no time in common: clocks_apart says so then, and first_ns and
+/// last_ns are of the events alone.
+Expected<Recording> open_unjoined_recording(const std::string& path, const std::string& calibration = "");
 
 Expected<std::unique_ptr<EventReader>> open_events(const Recording& recording, double packet_s = 1e-3);
 

@@ -165,6 +165,7 @@ def make_unseen(bench):
     """Seeds from 100 on are for reporting. What is finished stays in SCRATCH, as the program keeps it."""
     output = bench.scratch / ("unseen-quick" if bench.quick else "unseen")
     seeds = [1, "--quick"] if bench.quick else [UNSEEN_SEEDS]
-    bench.run("bench", "unseen", "--from", 100, "-o", output, "--keep", bench.unseen_folder, "--seeds", *seeds)
+    bench.run("bench", "unseen", "--from", 100, "-o", output, "--keep", bench.unseen_folder, "--minutes", bench.minutes,
+              "--seeds", *seeds)
     parts = re.findall(r"<!-- figures: (.*?) -->\n(.*?)<!-- end -->", (output / "README.md").read_text(), re.DOTALL)
     return bench.write_page("unseen", {key: lines.splitlines() for key, lines in parts})

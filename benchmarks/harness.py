@@ -41,10 +41,10 @@ class Recording:
 class Bench:
     """Where everything is, and what has been measured already."""
 
-    def __init__(self, evpose, microbench, shared, scratch, docs, quick=False):
+    def __init__(self, evpose, microbench, shared, scratch, docs, quick=False, minutes=0):
         self.evpose, self.microbench, self.shared = (pathlib.Path(p) for p in (evpose, microbench, shared))
         self.scratch, self.docs = pathlib.Path(scratch), pathlib.Path(docs)
-        self.quick = quick
+        self.quick, self.minutes = quick, minutes
         self._program = None
 
     # ---- running programs

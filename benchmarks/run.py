@@ -57,6 +57,8 @@ def parse():
     parser.add_argument("--fresh", action="store_true", help="measure again what is kept")
     parser.add_argument("--quick", action="store_true",
                         help="a little of each, to see that it works; pages and pictures go to SCRATCH/quick")
+    parser.add_argument("--minutes", type=float, default=0,
+                        help="of unseen: after which no seed is begun; the same command goes on")
     options = parser.parse_args()
     unknown = set(options.names) - set(BENCHMARKS) - {"all", "list"}
     if unknown:
@@ -71,7 +73,8 @@ def main():
             print(f"{name:18} {duration:>7}  {what}")
         return 0
     docs = options.scratch / "quick" if options.quick else harness.ROOT / "docs"
-    bench = harness.Bench(options.evpose, options.microbench, options.shared, options.scratch, docs, options.quick)
+    bench = harness.Bench(options.evpose, options.microbench, options.shared, options.scratch, docs, options.quick,
+                          options.minutes)
     if options.fresh:
         bench.forget()
     failed = []

@@ -3,6 +3,7 @@
 # libraries want from their users is what cmake/evpose-config.cmake.in looks for.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME evpose)
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each has its own
 set(CPACK_PACKAGE_CONTACT "the evpose authors <authors@evpose.invalid>")
 set(CPACK_COMPONENTS_ALL program development)
 if(TARGET evpose_python)
@@ -19,23 +20,22 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME evpose)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "6-DoF pose from an event camera and an IMU against a prior 3D map
- The program evpose: builds maps of contours from point clouds, tracks recordings
- and live cameras against them, judges trajectories, simulates flights.")
+The program evpose: builds maps of contours from point clouds, tracks recordings
+and live cameras against them, judges trajectories, simulates flights.")
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libevpose-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), libbz2-dev, libblosc-dev, libhdf5-dev, liblz4-dev, liblzf-dev,\
  libpng-dev, libsqlite3-dev, libyaml-cpp-dev, libzstd-dev, zlib1g-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "tracker of evpose as a library, its headers and CMake package
- Static libraries for find_package(evpose) and evpose::tracker, evpose::io.")
+Static libraries for find_package(evpose) and evpose::tracker, evpose::io.")
 
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-evpose)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
-math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
-set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "${EVPOSE_PYTHON_DEPENDS}, python3-numpy")
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "tracker of evpose as a Python module
- Events and IMU samples as numpy arrays in, poses out.")
+Events and IMU samples as numpy arrays in, poses out.")
 
 # evpose_document(COMPONENT PACKAGE FILE...): what lies in the package's folder of documentation, with its licence.
 function(evpose_document component package)

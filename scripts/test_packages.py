@@ -85,9 +85,9 @@ def try_program(debian, deb):
 
 
 def try_old_processor(debian):
-    track = ["evpose", "-q", "track", "/tmp/demo/recording", "--map", "/tmp/demo/recording/contours.ply"]
-    debian.run(*track, "-o", "/tmp/here")
-    debian.run(*OLD_PROCESSOR, "/usr/bin/evpose", *track[1:], "-o", "/tmp/old")
+    track = ["-q", "track", "/tmp/landing", "--map", "/tmp/landing/contours.ply"]
+    for program, run_folder in ((["evpose"], "/tmp/here"), ([*OLD_PROCESSOR, "/usr/bin/evpose"], "/tmp/old")):
+        debian.run("sh", "-c", '"$@" || [ $? = 1 ]', "sh", *program, *track, "-o", run_folder)  # 1: so short a flight
     if debian.bytes_of("tmp/here/trajectory.tum") != debian.bytes_of("tmp/old/trajectory.tum"):
         sys.exit("the old processor gives another trajectory")
     tested("an emulated processor without SSE 4 and AVX (`qemu-x86_64-static -cpu qemu64`) gives the same trajectory, "

@@ -7,6 +7,7 @@ Packages are installed in a bare Debian 12 in a folder of its own, which is remo
 seen by its own commands alone. An old processor is an emulated one.
 """
 import hashlib
+import os
 import pathlib
 import re
 import shutil
@@ -161,6 +162,10 @@ def page(table, wheel):
 
 
 def main():
+    if shutil.which("ccache"):
+        for name, value in (("CMAKE_C_COMPILER_LAUNCHER", "ccache"), ("CMAKE_CXX_COMPILER_LAUNCHER", "ccache"),
+                            ("CCACHE_SLOPPINESS", "pch_defines,time_macros")):
+            os.environ.setdefault(name, value)
     debs = make_packages()
     version = debs["evpose"].name.split("_")[1]
     with tempfile.TemporaryDirectory() as scratch:

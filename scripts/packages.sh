@@ -56,7 +56,7 @@ package=(
 arm64=(
   cmake ninja-build ccache
   g++-aarch64-linux-gnu  # the compiler
-  mmdebstrap           # libraries and headers of the other architecture, kept apart from this one's
+  mmdebstrap debian-archive-keyring  # its libraries and headers, kept apart from the system's own
   qemu-user-static     # runs the tests
 )
 

@@ -15,6 +15,9 @@ case "${1:-}" in
 esac
 
 scripts/packages.sh arm64
+for tool in aarch64-linux-gnu-g++ mmdebstrap qemu-aarch64-static; do
+  command -v $tool >/dev/null || { echo "arm64 skipped: $tool is not installed"; exit 77; }
+done
 sysroot=build/arm64_sysroot
 if [ ! -e $sysroot/complete ]; then
   rm -rf $sysroot

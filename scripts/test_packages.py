@@ -60,6 +60,7 @@ class BareDebian:
 
 
 def make_packages():
+    os.environ.setdefault("SOURCE_DATE_EPOCH", run("git", "-C", ROOT, "log", "-1", "--format=%ct").strip())
     run(ROOT / "scripts/make_debs.sh")
     debs = {path.name.split("_")[0]: path for path in BUILD.glob("*.deb")}
     before = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in debs.items()}

@@ -25,8 +25,8 @@ and live cameras against them, judges trajectories, simulates flights.")
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libevpose-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), libbz2-dev, libblosc-dev, libhdf5-dev, liblz4-dev, liblzf-dev,\
- libpng-dev, libsqlite3-dev, libyaml-cpp-dev, libzstd-dev, zlib1g-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), libbz2-dev, libblosc-dev, libhdf5-dev, liblz4-dev,\
+ liblzf-dev, libpng-dev, libsqlite3-dev, libyaml-cpp-dev, libzstd-dev, zlib1g-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "tracker of evpose as a library, its headers and CMake package
 Static libraries for find_package(evpose) and evpose::tracker, evpose::io.")
 

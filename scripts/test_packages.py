@@ -42,6 +42,7 @@ class BareDebian:
         run("mmdebstrap", "--quiet", "--variant=minbase", "bookworm", folder)
         (folder / "opt").mkdir(exist_ok=True)
         shutil.copy(shutil.which("qemu-x86_64-static"), folder / "opt")
+        self.run("apt-get", "-qq", "update")
 
     def run(self, *command):
         inside = 'mount -t proc proc "$0/proc" && cd / && exec chroot "$0" env -i PATH=$PATH HOME=/root LANG=C.UTF-8 "$@"'

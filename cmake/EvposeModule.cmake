@@ -1,3 +1,8 @@
+set(EVPOSE_TEST_TIMEOUT 300)
+if(CMAKE_CROSSCOMPILING)  # an emulator is some twenty times slower
+  set(EVPOSE_TEST_TIMEOUT 1800)
+endif()
+
 # evpose_module(NAME SOURCES ... [LINKS ...] [PRIVATE_LINKS ...] [TESTS ...])
 #   library evpose_NAME (evpose::NAME); its unit tests, if any, are the program evpose_NAME_test.
 function(evpose_module name)
@@ -19,7 +24,7 @@ function(evpose_module name)
     evpose_precompile(evpose_${name}_test evpose_precompiled_test)
     evpose_unity(evpose_${name}_test)
     gtest_discover_tests(evpose_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT 300 LABELS unit)
+                         PROPERTIES TIMEOUT ${EVPOSE_TEST_TIMEOUT} LABELS unit)
   endif()
 endfunction()
 

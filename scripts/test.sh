@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs what is missing, builds with warnings as errors and runs the tests. Format, lint, layers, installation,
 # browser and end-to-end checks are tests like all others: what fails is named in the summary at the end.
-# On two cores the first build takes about 10 minutes and all tests about 12, half of them the first lint; 64-bit ARM
-# comes last, in an emulator (scripts/test_arm64.sh).
+# On two cores the first build takes about 10 minutes and all tests about 12, half of them the first lint.
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    the modules' unit tests
 set -euo pipefail
@@ -22,9 +21,4 @@ export CCACHE_SLOPPINESS=pch_defines,time_macros  # without which it keeps nothi
 command -v ccache >/dev/null || unset CMAKE_C_COMPILER_LAUNCHER CMAKE_CXX_COMPILER_LAUNCHER
 cmake --preset dev
 cmake --build --preset dev
-ctest --preset dev --parallel 2 "${select[@]}" </dev/null
-[ ${#select[@]} -eq 0 ] || exit 0
-# The modules from core to registration once more, on another processor. A missing tool is a skip, as in ctest.
-status=0
-scripts/test_arm64.sh --quick || status=$?
-[ $status -eq 0 ] || { [ $status -eq 77 ] && [ "${CI:-}" != true ]; }
+exec ctest --preset dev --parallel 2 "${select[@]}" </dev/null

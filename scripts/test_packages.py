@@ -158,7 +158,7 @@ def page(table, wheel):
              "| package | section | MB | installed MiB | with its dependencies |", "|---|---|---|---|---|", *table, "",
              f"The wheel has {wheel.stat().st_size / 1e6:.1f} MB, for the distribution that it was made on.", "",
              "Held by that command, which stops at the first that is not so:", "", *(f"- {what}" for what in TESTED), "",
-             "Ubuntu 22.04 was not tried: packages for it have to be made on it. arm64 is in "
+             "Not tried: Ubuntu 22.04, whose packages have to be made on it, and `docker/Dockerfile`. arm64 is in "
              "[another page](arm64.md).", ""]
     PAGE.write_text("\n".join(lines))
 

@@ -1,6 +1,8 @@
 # Installation: the libraries a program needs to read, track and judge, their headers, the program itself, and what
 # find_package(evpose) wants. Component tracker: the modules from core to tracker. Component io: files and measures.
+# Each install component is a Debian package (cmake/EvposePackages.cmake): program, development, python.
 include(CMakePackageConfigHelpers)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 
 set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/evpose)
 function(evpose_install export)
@@ -14,7 +16,7 @@ endfunction()
 
 install(TARGETS evpose_eigen EXPORT evposeTrackerTargets)
 evpose_install(evposeTrackerTargets core camera imu event map registration fusion tracker)
-if(TARGET evpose_io)
+if(TARGET evpose_eval)
   foreach(room files hdf5 events bags calibration motion maps formats recording)
     install(TARGETS evpose_io_${room} EXPORT evposeIoTargets)
   endforeach()
@@ -22,9 +24,10 @@ if(TARGET evpose_io)
   evpose_install(evposeIoTargets io eval)
 endif()
 if(TARGET evpose)
-  install(TARGETS evpose)
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/evpose)
-  install(FILES ${PROJECT_SOURCE_DIR}/web/foxglove/evpose.json DESTINATION ${CMAKE_INSTALL_DATADIR}/evpose/foxglove)
+  install(TARGETS evpose COMPONENT program)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/evpose COMPONENT program)
+  install(FILES ${PROJECT_SOURCE_DIR}/web/foxglove/evpose.json DESTINATION ${CMAKE_INSTALL_DATADIR}/evpose/foxglove
+          COMPONENT program)
 endif()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/evpose-config.cmake.in

@@ -174,8 +174,8 @@ PYBIND11_MODULE(evpose, m) {
           "health", [](const Update& u) { return std::string(to_string(u.health)); },
           "waiting, initialising, tracking, degraded or lost")
       .def_readonly("reason", &Update::reason, "of the health, where it changed")
-      .def_readonly("points", &Update::points)
-      .def_readonly("points_matched", &Update::points_matched);
+      .def_readonly("points", &Update::points, "chosen map points")
+      .def_readonly("points_matched", &Update::points_matched, "of these, with events near by");
   py::class_<PyTracker>(
       m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
       .def(py::init<const std::string&, const std::string&, const Eigen::Matrix4d&, TimeNs,

@@ -3,6 +3,8 @@
 # The one list of packages that evpose needs, by their Debian and Ubuntu names, and their installation.
 #   scripts/packages.sh build    to build and run the program
 #   scripts/packages.sh test     the same, and all tests
+#   scripts/packages.sh package  to make and try packages and wheel
+#   scripts/packages.sh arm64    to build and test for 64-bit ARM
 # Does nothing when everything is there. Reasons and versions: docs/dependencies.md.
 set -euo pipefail
 
@@ -47,11 +49,25 @@ test=(
   clang-format-14      # pinned: each version formats differently
   clang-tidy-14        # pinned for the same reason
 )
+package=(
+  dpkg-dev file        # what a Debian package depends on
+  python3-dev pybind11-dev python3-pip python3-setuptools python3-wheel  # the Python module and its wheel
+  python3-venv python3-h5py  # try it
+  mmdebstrap qemu-user-static  # a bare Debian, and an old processor, to try them on
+)
+arm64=(
+  cmake ninja-build ccache
+  g++-aarch64-linux-gnu  # the compiler
+  mmdebstrap debian-archive-keyring  # its libraries and headers, kept apart from the system's own
+  qemu-user-static     # runs the tests
+)
 
 case "${1:-}" in
   build) wanted=("${build[@]}") ;;
   test) wanted=("${build[@]}" "${test[@]}") ;;
-  *) echo "usage: scripts/packages.sh build|test" >&2; exit 2 ;;
+  package) wanted=("${build[@]}" "${package[@]}") ;;
+  arm64) wanted=("${arm64[@]}") ;;
+  *) echo "usage: scripts/packages.sh build|test|package|arm64" >&2; exit 2 ;;
 esac
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then

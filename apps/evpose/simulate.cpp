@@ -25,16 +25,21 @@ struct SimulateRequest {
   bool dump = false;
 };
 
-// A file, or the name of a scenario that comes with the program.
+namespace fs = std::filesystem;
+
+// A file, or the name of a scenario that comes with the program: in the source tree, or where it is
+// installed.
 Expected<std::string> find_scenario(const std::string& name) {
-  namespace fs = std::filesystem;
   std::error_code ignored;
   if (fs::is_regular_file(name, ignored)) return name;
-  for (const char* folder : {"scenarios", EVPOSE_SCENARIOS}) {
-    const std::string path = text(folder, "/", name, ".yaml");
-    if (name.find('/') == std::string::npos && fs::is_regular_file(path, ignored)) return path;
+  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
+  const fs::path installed = (program.parent_path() / EVPOSE_SCENARIOS).lexically_normal();
+  for (const fs::path& folder : {fs::path("scenarios"), installed}) {
+    const fs::path path = folder / (name + ".yaml");
+    if (name.find('/') == std::string::npos && fs::is_regular_file(path, ignored)) return path.string();
   }
-  return Error{name, "no such scenario file", "see the folder scenarios/ for those that there are"};
+  const std::string known = fs::is_directory(installed, ignored) ? installed.string() : "scenarios";
+  return Error{name, "no such scenario", text("give a file, or the name of one in the folder ", known)};
 }
 
 Expected<sim::Scenario> load_scenario(const SimulateRequest& request) {
@@ -46,7 +51,7 @@ Expected<sim::Scenario> load_scenario(const SimulateRequest& request) {
     if (!path) return path.error();
     if (Status done = apply_yaml(table, *path); !done) return done.error();
     // Files that it names are beside it.
-    const std::filesystem::path beside = std::filesystem::path(*path).parent_path();
+    const fs::path beside = fs::path(*path).parent_path();
     for (std::string* file : {&scenario.scene_file, &scenario.trajectory.file}) {
       if (!file->empty()) *file = (beside / *file).string();
     }
@@ -109,8 +114,9 @@ void add_simulate(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand("simulate", "Make the recording of a flight through a made-up world");
   auto request = std::make_shared<SimulateRequest>();
   request->threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  command->add_option("scenario", request->scenario,
-                      "YAML file, or the name of one in scenarios/; default: a spiral through a hall");
+  command->add_option(
+      "scenario", request->scenario,
+      "YAML file, or the name of one that comes with evpose; default: a spiral through a hall");
   auto* output = command->add_option("-o,--output", request->output, "recording folder");
   command->add_option("--duration", request->duration_s, "seconds, instead of the scenario's");
   command->add_option("--seed", request->seed, "of world, trajectory and noise, instead of the scenario's");

@@ -11,6 +11,9 @@ endfunction()
 file(REMOVE_RECURSE ${WORK}/prefix)
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
 
+# The installed program finds its scenarios by their names, wherever it was installed.
+run(${WORK}/prefix/bin/evpose simulate landing --dump-config)
+
 # Nothing of the tree that was built may be named in what was installed: it may be gone tomorrow.
 file(GLOB_RECURSE package ${WORK}/prefix/*.cmake)
 foreach(file IN LISTS package)

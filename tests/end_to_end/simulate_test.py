@@ -96,7 +96,8 @@ class Simulate(unittest.TestCase):
     def test_no_such_scenario(self):
         done = self.run_evpose("simulate", "moon_landing", "-o", self.place / "recording")
         self.assertEqual(done.returncode, 2)
-        self.assertIn("moon_landing", done.stderr)
+        self.assertIn("moon_landing: no such scenario", done.stderr)
+        self.assertIn("scenarios", done.stderr)
 
     def test_nothing_else_is_replaced(self):
         (self.place / "recording").mkdir()

@@ -33,9 +33,10 @@ std::string Error::line() const {
   for (std::string_view rest = all; !rest.empty();) {
     const std::size_t n = character_bytes(rest);
     const auto first = static_cast<unsigned char>(rest[0]);
+    const bool control_of_two = first == 0xC2 && n == 2 && static_cast<unsigned char>(rest[1]) < 0xA0;
     if (first == '\n' || first == '\r' || first == '\t')
       out += ' ';
-    else if (n == 0 || first < 0x20 || first == 0x7F)
+    else if (n == 0 || first < 0x20 || first == 0x7F || control_of_two)
       out += '?';
     else
       out += rest.substr(0, n);

@@ -229,10 +229,6 @@ std::optional<RunCalibration> calibration_of(const TrackJob& job, const Calibrat
   return estimated ? std::optional(out) : std::nullopt;
 }
 
-}  // namespace
-
-namespace {
-
 /// Empty stays empty.
 std::string absolute(const std::string& path) {
   return path.empty() ? path : std::filesystem::absolute(path).lexically_normal().string();

@@ -19,9 +19,8 @@ namespace {
 
 constexpr double kOtherEpoch_s = 1e8;
 constexpr const char* kJoinClocks =
-    "set time.offset_events_s in recording.yaml (`evpose check` looks for it), or correct events.time_unit "
-    "or "
-    "imu.time_unit";
+    "set time.offset_events_s in recording.yaml (`evpose check` looks for it), "
+    "or correct events.time_unit or imu.time_unit";
 
 bool exists(const std::string& path) {
   struct stat info = {};

@@ -57,6 +57,9 @@ class BackEnd {
   virtual bool takes_contours() const { return false; }
   /// The newest state, with its covariance. A copy can be carried to any later time by propagator().
   virtual const FusionState& state() const = 0;
+  /// The same with the covariance that is reported: with what the framework knows to be uncertain beside what
+  /// it weighs measurements by.
+  virtual FusionState reported_state() const { return state(); }
 
   /// Of the pose that the next measurement will see: the state's, and what further states add.
   virtual Matrix6d measured_covariance() const { return state().pose_covariance(); }

@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "evpose/fusion/shared_errors.h"
+
 namespace evpose {
 
 Ekf::Ekf(const StatePropagator& propagator, const FusionConfig& config, const Pose& T_body_cam)
@@ -14,6 +16,7 @@ void Ekf::start(const FusionState& first) {
   if (offsets_) offsets_->remove_all(filter_);
   share_of_blocks_.setZero();
   filter_.reset_state(first);
+  filter_.follow_shared_errors(SharedErrors::kCount);
   calibration_.start(filter_);
 }
 
@@ -31,16 +34,18 @@ void Ekf::predict(TimeNs t) {
 void Ekf::update(const PoseInformation& measurement, std::span<const ContourOffset> contours) {
   calibration_.judge_excitation(filter_);
   measurement_.start(measurement, calibration_.pose_shifts(state()));
-  if (takes_contours()) add_contours(contours);
+  measurement_.expect_shared_errors(SharedErrors::kCount);
+  add_contours(contours);
   filter_.update(measurement_);
   if (offsets_) offsets_->apply_corrections(filter_);
-  if (takes_contours()) share_of_blocks_ = filter_.share_of_blocks(measurement_);
+  if (blocks_take_contours()) share_of_blocks_ = filter_.share_of_blocks(measurement_);
   apply_calibration();
 }
 
 void Ekf::update(const SeenMeasurement& measurement) {
   measurement_.start({measurement.information.topLeftCorner<6, 6>(), measurement.vector.head<6>()},
                      calibration_.pose_shifts(state()));
+  measurement_.expect_shared_errors(SharedErrors::kCount);
   if (const auto numbers = calibration_.intrinsics())
     measurement_.add_block(*numbers, measurement.information, measurement.vector);
   filter_.update(measurement_);
@@ -59,7 +64,13 @@ Eigen::MatrixXd Ekf::seen_covariance() const {
   return filter_.seen_covariance(calibration_.pose_shifts(state()), numbers ? &*numbers : nullptr);
 }
 
-/// Adds what the contours say about the blocks that they depend on one by one.
+FusionState Ekf::reported_state() const {
+  FusionState out = state();
+  out.covariance += filter_.shared_covariance();
+  return out;
+}
+
+/// Adds what the contours say about the blocks that they depend on one by one, and what errors they share.
 void Ekf::add_contours(std::span<const ContourOffset> contours) {
   const Eigen::Matrix3d R = state().nav.T_map_body.rotation();
   std::array<BlockRow, 2> rows;
@@ -72,14 +83,16 @@ void Ekf::add_contours(std::span<const ContourOffset> contours) {
         residual -= effect->present_px;
       }
     if (const auto row = calibration_.row_of(contour)) rows[n++] = *row;
-    if (n > 0)
-      measurement_.add({contour.by_pose(R), contour.weight, residual, contour.offset_px, {rows.data(), n}});
+    const BlockSample sample{
+        contour.by_pose(R), contour.weight, residual, contour.offset_px, {rows.data(), n}};
+    if (n > 0) measurement_.add(sample);
+    SharedErrors::add(contour, sample, measurement_);
   }
 }
 
 Matrix6d Ekf::measured_covariance() const {
   const Matrix6d seen = filter_.seen_pose_covariance(calibration_.pose_shifts(state()));
-  return takes_contours() ? Matrix6d(seen + share_of_blocks_) : seen;
+  return blocks_take_contours() ? Matrix6d(seen + share_of_blocks_) : seen;
 }
 
 std::span<const SegmentOffsets::Segment> Ekf::segments() const {

@@ -26,8 +26,9 @@ class Ekf : public BackEnd {
   void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
   void update(const SeenMeasurement& measurement) override;
   Eigen::MatrixXd seen_covariance() const override;
-  bool takes_contours() const override { return offsets_.has_value() || calibration_.takes_contours(); }
+  bool takes_contours() const override { return true; }
   const FusionState& state() const override { return filter_.state(); }
+  FusionState reported_state() const override;
   Matrix6d measured_covariance() const override;
   Calibration calibration() const override { return calibration_.calibration(); }
 
@@ -36,6 +37,7 @@ class Ekf : public BackEnd {
   std::span<const SegmentOffsets::Segment> segments() const;
 
  private:
+  bool blocks_take_contours() const { return offsets_.has_value() || calibration_.takes_contours(); }
   void add_contours(std::span<const ContourOffset> contours);
   void apply_calibration();
 

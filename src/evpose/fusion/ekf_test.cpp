@@ -199,6 +199,62 @@ TEST(Ekf, PoseAndNumbersMeasuredTogetherAreTheirContours) {
   EXPECT_GT(together.calibration().intrinsics.norm(), 0);
 }
 
+/// Contours all around, of which all events come late by `delay_s` and those of a direction stand off alike.
+std::vector<ContourOffset> late_contours(std::mt19937& random, const NavState& truth, const NavState& at,
+                                         double delay_s, const Eigen::Matrix<double, 8, 1>& offsets_px) {
+  std::normal_distribution<double> normal;
+  std::vector<ContourOffset> out(60);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    ContourOffset& c = out[i];
+    const auto direction = static_cast<Eigen::Index>(i % 8);
+    c.normal_px =
+        Eigen::Rotation2Dd(static_cast<double>(direction) * EIGEN_PI / 4) * Eigen::Vector2d::UnitX();
+    c.point_body = {normal(random), normal(random), 3 + 0.3 * normal(random)};
+    c.across_body << 100 * c.normal_px, 0;
+    c.darker = i % 3 == 0 ? -1 : 1;
+    c.speed_px_s = 60 * c.normal_px.x() + 10 * normal(random);
+    c.weight = 25;
+    const auto dark = c.darker > 0 ? direction : (direction + 4) % 8;
+    c.offset_px = c.by_pose(at.T_map_body.rotation()).dot(truth.T_map_body.minus(at.T_map_body)) +
+                  delay_s * c.speed_px_s + c.darker * offsets_px(dark) + 0.2 * normal(random);
+  }
+  return out;
+}
+
+TEST(Ekf, ReportsACovarianceThatHoldsWithErrorsThatContoursShare) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  const StatePropagator propagator(MotionModel::constant_velocity, FusionConfig{}, ImuNoise{});
+  double own = 0, reported = 0;
+  constexpr int kFlights = 200;
+  for (int flight = 0; flight < kFlights; ++flight) {
+    Ekf ekf(propagator);
+    const NavState truth{{}, {0, 0, 0}};
+    ekf.start(0, truth, {0, 0, 0});
+    const double delay_s = 2e-3 * normal(random);
+    Eigen::Matrix<double, 8, 1> offsets_px;
+    for (double& offset : offsets_px) offset = 0.08 * normal(random);
+    for (int k = 1; k <= 100; ++k) {
+      ekf.predict(k * 3 * kNsPerMs);
+      PoseInformation pose;
+      const auto contours = late_contours(random, truth, ekf.state().nav, delay_s, offsets_px);
+      for (const ContourOffset& c : contours) {
+        const Vector6d by_pose = c.by_pose(ekf.state().nav.T_map_body.rotation());
+        pose.information += c.weight * by_pose * by_pose.transpose();
+        pose.vector += c.weight * c.offset_px * by_pose;
+      }
+      ekf.update(pose, contours);
+    }
+    const Vector6d e = truth.T_map_body.minus(ekf.state().nav.T_map_body);
+    own += e.dot(ekf.state().pose_covariance().ldlt().solve(e)) / 6 / kFlights;
+    reported += e.dot(ekf.reported_state().pose_covariance().ldlt().solve(e)) / 6 / kFlights;
+  }
+  EXPECT_GT(own, 2);
+  // A little cautious: nothing moves, while constant velocity allows that it does.
+  EXPECT_GT(reported, 0.7);
+  EXPECT_LT(reported, 1.2);
+}
+
 TEST(Ekf, ConstantVelocityLearnsTwistFromPosesAlone) {
   Ekf ekf(StatePropagator(MotionModel::constant_velocity, FusionConfig{}, ImuNoise{}));
   NavState nav;

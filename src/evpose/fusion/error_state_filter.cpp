@@ -23,6 +23,13 @@ const ErrorStateFilter::Slot& ErrorStateFilter::slot(BlockId id) const {
 void ErrorStateFilter::reset_state(const FusionState& state) {
   state_ = state;
   cross_.setZero();
+  by_shared_.resize(15, 0);
+  blocks_by_shared_.resize(block_states(), 0);
+}
+
+void ErrorStateFilter::follow_shared_errors(int count) {
+  by_shared_.setZero(15, count);
+  blocks_by_shared_.setZero(block_states(), count);
 }
 
 BlockId ErrorStateFilter::add_block(const Eigen::VectorXd& sigma) {
@@ -34,6 +41,7 @@ BlockId ErrorStateFilter::add_block(const Eigen::VectorXd& sigma) {
   slots_[number] = {block_states(), static_cast<int>(sigma.size()), false};
   cross_.conservativeResize(Eigen::NoChange, all);
   blocks_.conservativeResize(all, all);
+  blocks_by_shared_.conservativeResize(all, Eigen::NoChange);
   correction_.setZero(all);
   reset_block(static_cast<BlockId>(number), sigma);
   return static_cast<BlockId>(number);
@@ -43,6 +51,7 @@ void ErrorStateFilter::reset_block(BlockId id, const Eigen::VectorXd& sigma) {
   const Slot& s = slot(id);
   EVPOSE_CHECK(sigma.size() == s.size);
   cross_.middleCols(s.at, s.size).setZero();
+  blocks_by_shared_.middleRows(s.at, s.size).setZero();
   blocks_.middleRows(s.at, s.size).setZero();
   blocks_.middleCols(s.at, s.size).setZero();
   blocks_.diagonal().segment(s.at, s.size) = sigma.cwiseAbs2();
@@ -54,8 +63,10 @@ void ErrorStateFilter::remove_block(BlockId id) {
   cross_.middleCols(gone.at, after) = cross_.rightCols(after).eval();
   blocks_.middleRows(gone.at, after) = blocks_.bottomRows(after).eval();
   blocks_.middleCols(gone.at, after) = blocks_.rightCols(after).eval();
+  blocks_by_shared_.middleRows(gone.at, after) = blocks_by_shared_.bottomRows(after).eval();
   cross_.conservativeResize(Eigen::NoChange, left);
   blocks_.conservativeResize(left, left);
+  blocks_by_shared_.conservativeResize(left, Eigen::NoChange);
   correction_.setZero(left);
   slots_[static_cast<std::size_t>(id)] = {};
   for (Slot& s : slots_)
@@ -89,17 +100,17 @@ Eigen::MatrixXd ErrorStateFilter::joint_covariance() const {
 
 void ErrorStateFilter::propagate(const StatePropagator& propagator, const ImuSample& a, const ImuSample& b,
                                  ImuTrust trust) {
-  if (block_states() == 0) return propagator.propagate(state_, a, b, trust);
   Matrix15d F;
   propagator.propagate(state_, a, b, trust, &F);
   cross_ = (F * cross_).eval();
+  by_shared_ = (F * by_shared_).eval();
 }
 
 void ErrorStateFilter::propagate(const StatePropagator& propagator, TimeNs t) {
-  if (block_states() == 0) return propagator.propagate(state_, t);
   Matrix15d F;
   propagator.propagate(state_, t, &F);
   cross_ = (F * cross_).eval();
+  by_shared_ = (F * by_shared_).eval();
 }
 
 void ErrorStateFilter::add_effect(BlockId id, const ByState& by_block) {
@@ -108,6 +119,7 @@ void ErrorStateFilter::add_effect(BlockId id, const ByState& by_block) {
   state_.covariance +=
       mixed + mixed.transpose() + by_block * blocks_.block(s.at, s.at, s.size, s.size) * by_block.transpose();
   cross_ += by_block * blocks_.middleRows(s.at, s.size);
+  by_shared_ += by_block * blocks_by_shared_.middleRows(s.at, s.size);
 }
 
 void ErrorStateFilter::update(const JointMeasurement& measurement) {
@@ -152,6 +164,13 @@ void ErrorStateFilter::update_measured(const JointMeasurement& m) {
   const Eigen::PartialPivLU<Square> lu(Square::Identity(measured, measured) + H * P_yy);
   const Eigen::Matrix<double, kMeasured, 1> weighed = lu.solve(b);
   const Square gained = lu.solve(H);
+  if (by_shared_.cols() > 0) {
+    const Eigen::MatrixXd moved = lu.solve(m.shared_errors() - H * measured_by_shared(m));
+    const Eigen::MatrixXd kept = blocks_by_shared_(considered_, Eigen::all);
+    by_shared_.noalias() += P_xy * moved;
+    blocks_by_shared_.noalias() += P_by * moved;
+    blocks_by_shared_(considered_, Eigen::all) = kept;
+  }
   const Vector15d dx = P_xy * weighed;
   state_.covariance -= (P_xy * gained * P_xy.transpose()).eval();
   symmetrise(state_.covariance);
@@ -169,6 +188,19 @@ void ErrorStateFilter::update_measured(const JointMeasurement& m) {
   state_.covariance = (turned * state_.covariance * turned.transpose()).eval();
   symmetrise(state_.covariance);
   if (others > 0) cross_ = (turned * cross_).eval();
+  by_shared_ = (turned * by_shared_).eval();
+}
+
+/// Derivative of the measured errors by the shared ones.
+Eigen::MatrixXd ErrorStateFilter::measured_by_shared(const JointMeasurement& m) const {
+  Eigen::MatrixXd out(m.size(), by_shared_.cols());
+  out.topRows<6>() = by_shared_.topRows<6>();
+  for (const PoseShift& shift : m.shifts())
+    out.topRows<6>() +=
+        shift.by_block * blocks_by_shared_.middleRows(slot(shift.block).at, shift.by_block.cols());
+  for (const JointMeasurement::Block& block : m.blocks())
+    out.middleRows(block.at, block.size) = blocks_by_shared_.middleRows(slot(block.id).at, block.size);
+  return out;
 }
 
 /// The blocks' own covariance after an update; a considered block has neither correction nor gain.

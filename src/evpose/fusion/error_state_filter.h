@@ -50,6 +50,12 @@ class ErrorStateFilter {
   /// Kalman update by a measurement relative to the state's pose and the blocks' present values.
   void update(const JointMeasurement& measurement);
 
+  /// Follows this many errors that many measurements share and of which an update knows nothing: it takes
+  /// measurements for independent. Until the next reset_state(), and from no effect on.
+  void follow_shared_errors(int count);
+  /// What they add to the state's covariance, each being as large as the measurements say one sigma is.
+  Matrix15d shared_covariance() const { return by_shared_ * by_shared_.transpose(); }
+
   /// Covariance of the error of the pose that is seen.
   Matrix6d seen_pose_covariance(std::span<const PoseShift> shifts) const;
   /// The same jointly with the velocity and, if given, a block.
@@ -67,6 +73,7 @@ class ErrorStateFilter {
   void list_considered();
   template <int kMeasured>
   void update_measured(const JointMeasurement& measurement);
+  Eigen::MatrixXd measured_by_shared(const JointMeasurement& measurement) const;
   void correct_blocks(const Eigen::Ref<const Eigen::MatrixXd>& P_by,
                       const Eigen::Ref<const Eigen::MatrixXd>& gained_by);
 
@@ -76,6 +83,8 @@ class ErrorStateFilter {
   ByState cross_ = ByState(15, 0);                  ///< covariance of the state with the blocks
   Eigen::MatrixXd blocks_ = Eigen::MatrixXd(0, 0);  ///< covariance of the blocks
   Eigen::VectorXd correction_;
+  ByState by_shared_ = ByState(15, 0);                        ///< error of the state by each shared error
+  Eigen::MatrixXd blocks_by_shared_ = Eigen::MatrixXd(0, 0);  ///< likewise of the blocks
 };
 
 }  // namespace evpose

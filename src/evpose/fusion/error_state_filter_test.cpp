@@ -366,6 +366,87 @@ TEST(ErrorStateFilter, ConsideringIsSchmidtsFilter) {
   }
 }
 
+// --- errors that measurements share ---
+
+/// A filter and the values of its blocks, whose true values are zero, on a flight whose true state is known.
+struct Flown {
+  Mixed mixed;
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(6);
+
+  /// An update by samples without noise whose residuals are `px` too large.
+  void update(const std::vector<Sample>& drawn, const FusionState& truth, const std::vector<double>& px,
+              double share) {
+    ErrorStateFilter& filter = mixed.filter;
+    Vector6d seen = truth.minus(filter.state()).head<6>();
+    seen -= mixed.shift.by_block * values.segment<3>(filter.at(mixed.shifting));
+    std::vector<Sample> samples = drawn;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      samples[i].residual = samples[i].by_pose.dot(seen) + share * px[i];
+      for (const BlockRow& row : samples[i].rows)
+        samples[i].residual -= row.by_block.dot(values.segment(filter.at(row.block), row.by_block.size()));
+      samples[i].residual_in_pose = samples[i].residual;
+    }
+    JointMeasurement m = joined(samples, {&mixed.shift, 1});
+    m.expect_shared_errors(1);
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      m.add_shared_error(0, px[i], {samples[i].by_pose, samples[i].weight, 0, 0, samples[i].rows});
+    filter.update(m);
+    for (const BlockId id : {mixed.shifting, mixed.sampled, mixed.offset})
+      values.segment(filter.at(id), filter.covariance(id).rows()) += filter.correction(id);
+  }
+};
+
+TEST(ErrorStateFilter, FollowsASharedErrorAsDifferencesSay) {
+  constexpr double kShare = 1e-4;
+  Flown without{Mixed(11)}, with{Mixed(11)};
+  Draw draw(12);
+  FusionState truth = without.mixed.filter.state();
+  truth.add(1e-6 * draw.vector(15));
+  const StatePropagator propagator = some_propagator();
+  for (Flown* flown : {&without, &with}) {
+    flown->mixed.filter.set_considered(flown->mixed.offset, true);
+    flown->mixed.filter.follow_shared_errors(1);
+  }
+  for (int k = 0; k < 6; ++k) {
+    const std::vector<Sample> samples = without.mixed.samples(12, 1);
+    const Eigen::VectorXd px = draw.vector(12);
+    const std::vector<double> each(px.begin(), px.end());
+    without.update(samples, truth, each, 0);
+    with.update(samples, truth, each, kShare);
+    const ImuSample from = reading(k * kNsPerMs), to = reading((k + 1) * kNsPerMs);
+    propagator.propagate(truth, from, to, ImuTrust::good);
+    for (Flown* flown : {&without, &with})
+      flown->mixed.filter.propagate(propagator, from, to, ImuTrust::good);
+  }
+  const Vector15d moved = with.mixed.filter.state().minus(without.mixed.filter.state()) / kShare;
+  const Matrix15d expected = moved * moved.transpose();
+  EXPECT_LT((without.mixed.filter.shared_covariance() - expected).norm(), 1e-3 * expected.norm());
+  EXPECT_GT(moved.head<3>().norm(), 1e-4);
+}
+
+TEST(ErrorStateFilter, ASharedErrorDoesNotAverageOut) {
+  const double sigma_m = 0.01, weight = 4, by_x = 200, px = 0.2;
+  ErrorStateFilter filter;
+  FusionState state;
+  state.covariance.diagonal().setConstant(sigma_m * sigma_m);
+  filter.reset_state(state);
+  filter.follow_shared_errors(1);
+  const Vector6d by_pose = by_x * Vector6d::Unit(0);
+  for (int n = 1; n <= 1000; ++n) {
+    JointMeasurement m;
+    m.start({weight * by_pose * by_pose.transpose(), Vector6d::Zero()});
+    m.expect_shared_errors(1);
+    m.add_shared_error(0, px, {by_pose, weight, 0, 0, {}});
+    filter.update(m);
+    const double told = n * weight * by_x * by_x * sigma_m * sigma_m;
+    const double expected = px / by_x * told / (1 + told);
+    ASSERT_NEAR(std::sqrt(filter.shared_covariance()(0, 0)), expected, 1e-9 * expected) << n;
+  }
+  EXPECT_GT(filter.shared_covariance()(0, 0), 100 * filter.state().covariance(0, 0));
+  filter.reset_state(state);
+  EXPECT_EQ(filter.shared_covariance().norm(), 0);
+}
+
 TEST(ErrorStateFilter, CovarianceStaysPositiveSemiDefinite) {
   Mixed mixed(11);
   ErrorStateFilter& filter = mixed.filter;

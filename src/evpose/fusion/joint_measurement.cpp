@@ -14,6 +14,21 @@ void JointMeasurement::start(const PoseInformation& pose, std::span<const PoseSh
   size_ = 6;
   information_.topLeftCorner<6, 6>() = pose.information;
   vector_.head<6>() = pose.vector;
+  shared_errors_.topRows<6>().setZero();
+}
+
+void JointMeasurement::expect_shared_errors(int count) {
+  shared_errors_.setZero(shared_errors_.rows(), count);
+}
+
+void JointMeasurement::add_shared_error(int number, double px, const BlockSample& s) {
+  auto column = shared_errors_.col(number);
+  column.head<6>() += s.weight * px * s.by_pose;
+  for (const BlockRow& row : s.rows) {
+    const auto n = static_cast<int>(row.by_block.size());
+    const Block here = blocks_[static_cast<std::size_t>(place_of(row.block, n))];
+    column.segment(here.at, n) += s.weight * px * row.by_block.transpose();
+  }
 }
 
 int JointMeasurement::place_of(BlockId id, int size) {
@@ -28,10 +43,12 @@ int JointMeasurement::place_of(BlockId id, int size) {
     const Eigen::Index room = std::max<Eigen::Index>(size_, 2 * information_.rows());
     information_.conservativeResize(room, room);
     vector_.conservativeResize(room);
+    shared_errors_.conservativeResize(room, Eigen::NoChange);
   }
   information_.block(first, 0, size, size_).setZero();
   information_.block(0, first, size_, size).setZero();
   vector_.segment(first, size).setZero();
+  shared_errors_.middleRows(first, size).setZero();
   return place_[number];
 }
 

@@ -52,6 +52,11 @@ class JointMeasurement {
   /// Its share of the pose's own is in there already.
   void add_block(BlockId id, const Eigen::MatrixXd& information, const Eigen::VectorXd& vector);
 
+  /// Room for this many errors that samples share and that are no states; after start().
+  void expect_shared_errors(int count);
+  /// By how much a shared error of one sigma moves the sample's residual, px.
+  void add_shared_error(int number, double px, const BlockSample& sample);
+
   struct Block {
     BlockId id;
     int at, size;  ///< among the measured errors
@@ -61,6 +66,8 @@ class JointMeasurement {
   int size() const { return size_; }
   auto information() const { return information_.topLeftCorner(size_, size_); }
   auto vector() const { return vector_.head(size_); }
+  /// By how much each shared error, of one sigma, moves the vector.
+  auto shared_errors() const { return shared_errors_.topRows(size_); }
 
  private:
   int place_of(BlockId id, int size);
@@ -72,6 +79,7 @@ class JointMeasurement {
   // With room to spare, so that they are not made anew with each block; symmetric up to size_.
   Eigen::MatrixXd information_ = Eigen::MatrixXd::Zero(6, 6);
   Eigen::VectorXd vector_ = Eigen::VectorXd::Zero(6);
+  Eigen::MatrixXd shared_errors_ = Eigen::MatrixXd::Zero(6, 0);
 };
 
 }  // namespace evpose

@@ -56,6 +56,10 @@ struct ContourOffset {
   double weight = 0;            ///< px^-2
   std::uint32_t segment = 0;    ///< of the map, as the back end has it cut
   double sigma_m = 0;           ///< error of the contour that the map states
+  Eigen::Vector2d normal_px =
+      Eigen::Vector2d::Zero();  ///< unit, in the image, to where distances are positive
+  double speed_px_s = 0;        ///< of the contour along the normal
+  int darker = 0;               ///< +1: it is darker where the normal points, -1: brighter, 0: not known
   /// Derivative of an event's signed distance by the numbers of the camera; empty: not asked for.
   Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 9> by_intrinsics{};
 

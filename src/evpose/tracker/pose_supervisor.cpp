@@ -84,8 +84,8 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
 }
 
 Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::string* reason) {
-  const Matrix6d covariance = fusion.state().pose_covariance();
-  const PoseUncertainty uncertainty(fusion.state(), e.focal_px, e.typical_depth_m);
+  const FusionState state = fusion.reported_state();
+  const PoseUncertainty uncertainty(state, e.focal_px, e.typical_depth_m);
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
   Evidence evidence;
   evidence.t = e.t;
@@ -100,7 +100,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   astray_s_ = is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
   if (verification_is_over(e.t)) verify_until_ = 0;
   if (refuted) resume_search(e.t, fusion);
-  if (search_is_due()) begin_search(e.t, fusion, covariance);
+  if (search_is_due()) begin_search(e.t, fusion, state.pose_covariance());
   return health;
 }
 

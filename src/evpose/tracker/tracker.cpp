@@ -189,7 +189,7 @@ void Tracker::make_update() {
   next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
   if (update_callback_) update_callback_(result);
   if (setup_.motion != MotionModel::imu) return;
-  imu_rate_output_.restart(fusion_->state(), imu_.reading());
+  imu_rate_output_.restart(fusion_->reported_state(), imu_.reading());
   imu_rate_output_.report_until(imu_time(next_update_), *fusion_, imu_);
 }
 
@@ -216,7 +216,7 @@ Update Tracker::update(TimeNs t) {
   judge(t, span_s, stpe, refused);
   preprocessor_.set_motion(contours_.typical_flow_px_s());
   preprocessor_.clear_kept();
-  return reporter_.finish(fusion_->state(), preprocessor_.counts());
+  return reporter_.finish(fusion_->reported_state(), preprocessor_.counts());
 }
 
 /// When the pose is found, tracking begins there.
@@ -275,6 +275,12 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   return result;
 }
 
+/// +1: it is darker where the map's normal points, -1: brighter, 0: not known.
+int Tracker::darker_side(std::uint32_t segment) const {
+  const ContrastMemory* contrast = registration_->contrast();
+  return contrast == nullptr ? 0 : -contrast->map_contrast(segment);
+}
+
 ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
   const Pose& predicted = fusion_->state().nav.T_map_body;
   const ContourSample& s = contours_.samples()[offset.sample];
@@ -283,7 +289,10 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
                     offset.offset_px,
                     offset.weight,
                     offset_segments_.empty() ? s.segment : offset_segments_[s.point],
-                    setup_.map->points[s.point].sigma};
+                    setup_.map->points[s.point].sigma,
+                    s.normal_px,
+                    s.speed_px_s,
+                    s.normal_side * darker_side(s.segment)};
   if (!adjusted_) return out;
   const auto by_numbers = adjusted_->by_numbers(T_body_cam_.inverse() * out.point_body);
   if (by_numbers) out.by_intrinsics = -s.normal_px.transpose() * *by_numbers;
@@ -300,7 +309,7 @@ void Tracker::fuse(const RegistrationResult& measurement) {
 
 void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement,
                     const std::string& refused) {
-  const Matrix6d covariance = fusion_->state().pose_covariance();
+  const Matrix6d covariance = fusion_->reported_state().pose_covariance();
   std::string reason;
   const Health health = supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement),
                                            contours_.typical_depth_m(), setup_.camera->focal_px()},

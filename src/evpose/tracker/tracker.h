@@ -107,6 +107,7 @@ class Tracker {
   bool align_start(TimeNs t, const ImuIncrement& moved);
   void take_calibration();
   RegistrationResult measure(TimeNs t, double span_s);
+  int darker_side(std::uint32_t segment) const;
   ContourOffset contour_offset(const SampleOffset& offset) const;
   void fuse(const RegistrationResult& measurement);
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);

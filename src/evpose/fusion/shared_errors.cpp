@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/fusion/shared_errors.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "evpose/fusion/joint_measurement.h"
+
+namespace evpose {
+namespace {
+
+// Of one sigma; docs/decisions/tracking.md has what they were chosen on.
+constexpr double kDelay_s = 2e-3, kOffset_px = 0.08;
+
+int direction_of(const Eigen::Vector2d& normal_px) {
+  constexpr double kWidth_rad = 2 * std::numbers::pi / SharedErrors::kDirections;
+  const auto turns = static_cast<int>(std::lround(std::atan2(normal_px.y(), normal_px.x()) / kWidth_rad));
+  return (turns + SharedErrors::kDirections) % SharedErrors::kDirections;
+}
+
+}  // namespace
+
+void SharedErrors::add(const ContourOffset& contour, const BlockSample& sample,
+                       JointMeasurement& measurement) {
+  measurement.add_shared_error(0, kDelay_s * contour.speed_px_s, sample);
+  const int side = contour.darker < 0 ? -1 : 1;
+  measurement.add_shared_error(1 + direction_of(side * contour.normal_px), side * kOffset_px, sample);
+}
+
+}  // namespace evpose

@@ -13,6 +13,8 @@
 EVPOSE_ASSET(viewer_html)
 EVPOSE_ASSET(viewer_css)
 EVPOSE_ASSET(viewer_js)
+EVPOSE_ASSET(picture_js)
+EVPOSE_ASSET(plots_js)
 EVPOSE_ASSET(three_js)
 EVPOSE_ASSET(orbit_js)
 
@@ -44,6 +46,8 @@ void set_viewer_pages(Server& server, const std::string& mode) {
   server.set_page("/", "text/html; charset=utf-8", viewer_html());
   server.set_page("/viewer.css", "text/css; charset=utf-8", viewer_css());
   server.set_page("/viewer.js", script, viewer_js());
+  server.set_page("/picture.js", script, picture_js());
+  server.set_page("/plots.js", script, plots_js());
   server.set_page("/three.js", script, three_js());
   // The library's own word for itself is none that a browser knows without being told.
   std::string orbit = orbit_js();

@@ -16,6 +16,7 @@
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/ply.h"
 #include "evpose/tracker/tracker.h"
+#include "evpose_files.h"
 
 namespace py = pybind11;
 
@@ -24,13 +25,6 @@ namespace {
 
 template <class T>
 using Column = py::array_t<T, py::array::c_style | py::array::forcecast>;
-
-/// The value, or a Python ValueError with the one line that says what is wrong.
-template <class T>
-T value_of(Expected<T> expected) {
-  if (!expected) throw py::value_error(expected.error().line());
-  return std::move(*expected);
-}
 
 Pose pose_of(const Eigen::Matrix4d& T) {
   const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
@@ -64,11 +58,9 @@ class PyTracker {
     TrackerConfig config;
     ConfigTable table;
     describe(table, config);
-    for (const auto& [key, setting] : settings) {
-      std::string word = py::str(setting);
-      if (py::isinstance<py::bool_>(setting)) word = setting.cast<bool>() ? "true" : "false";
-      if (const auto ok = table.set(key, word, "settings"); !ok) throw py::value_error(ok.error().line());
-    }
+    for (const auto& [key, setting] : settings)
+      if (const auto ok = table.set(key, setting_text(setting), "settings"); !ok)
+        throw py::value_error(ok.error().line());
     tracker_ = value_of(Tracker::create(setup, config, {t_ns, pose_of(T_map_body), velocity, {0, 0, 0}}));
     tracker_->on_update([this](const Update& u) { made_.push_back(u); });
   }
@@ -190,4 +182,7 @@ PYBIND11_MODULE(evpose, m) {
       .def("add_imu", &PyTracker::add_imu, "t_ns"_a, "samples"_a,
            "int64 ns of shape (n,); (n, 6): gyro rad/s, accel m/s^2; gives the updates that were made")
       .def_property_readonly("has_imu", &PyTracker::has_imu, "the calibration knows where the IMU sits");
+  bind_recordings(m);
+  bind_maps(m);
+  bind_runs(m);
 }

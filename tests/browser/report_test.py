@@ -16,9 +16,14 @@ import zlib
 
 import chromium
 
-RUN_PLOTS = ["trajectory", "top", "ate", "are", "position-axes", "rotation-axes", "cdf-ate", "cdf-are", "latency",
-             "events", "points"]
+RUN_PLOTS = ["trajectory", "top", "ate", "are", "position-axes", "rotation-axes", "cdf-ate", "cdf-are", "velocity",
+             "attitude", "gyro-bias", "accel-bias", "calibration-time", "calibration-turn", "calibration-shift",
+             "calibration-gravity", "calibration-pinhole", "calibration-distortion", "latency", "events", "points"]
 EVAL_PLOTS = RUN_PLOTS[:8]
+RUN_SECTIONS = ["Trajectory", "What the tracker saw", "Start", "Error against ground truth", "Motion", "Biases of the IMU",
+                "Calibration", "Work and health"]
+EVAL_SECTIONS = ["Trajectory", "Error against ground truth"]
+MOST_BYTES = 2_500_000
 VIEWS = {"wide": {"width": 1440, "height": 900}, "dark": {"width": 1440, "height": 900, "dark": True},
          "phone": {"width": 390, "height": 844, "mobile": True}}
 
@@ -47,13 +52,20 @@ LOOK = """
   }
   const root = document.documentElement;
   out.overflow = root.scrollWidth - root.clientWidth;
+  out.sections = [...document.querySelectorAll("h2")].map((h) => h.textContent);
+  // What is wider than its place must say so, in words that are seen; what is not must not.
+  out.scrolls = [...document.querySelectorAll(".scroll, .strip")].map((box) => ({
+    wide: box.clientWidth > 0 && box.scrollWidth > box.clientWidth + 2,
+    told: box.previousElementSibling.classList.contains("hint") && box.previousElementSibling.clientHeight > 0,
+    shaded: box.classList.contains("more-right"),
+  }));
   out.markup = document.querySelectorAll("room").length;
   return out;
 })()
 """
 
 
-def look(page, url, plots):
+def look(page, url, plots, sections):
     """Faults of a page, in words."""
     if not page.wait_for("document.documentElement?.dataset.ready"):
         yield "never ready"
@@ -63,6 +75,11 @@ def look(page, url, plots):
     seen = page.run(LOOK)
     if list(seen["plots"]) != plots:
         yield f"plots {list(seen['plots'])} instead of {plots}"
+    if seen["sections"] != sections:
+        yield f"sections {seen['sections']} instead of {sections}"
+    for number, box in enumerate(seen["scrolls"]):
+        if not box["wide"] == box["told"] == box["shaded"]:
+            yield f"sideways scroll of table or strip {number}: {box}"
     for name, plot in seen["plots"].items():
         if plot.get("drawn") != "yes" or plot["colours"] < 3 or plot["height"] < 150:
             yield f"plot {name} is empty: {plot}"
@@ -102,11 +119,13 @@ def main():
     subprocess.run([make_reports, folder], check=True)
     faults = []
     with chromium.Browser(program) as browser:
-        for name, plots in (("run/report.html", RUN_PLOTS), ("eval.html", EVAL_PLOTS)):
+        for name, plots, sections in (("run/report.html", RUN_PLOTS, RUN_SECTIONS), ("eval.html", EVAL_PLOTS, EVAL_SECTIONS)):
+            if (size := (folder / name).stat().st_size) > MOST_BYTES:
+                faults.append(f"{name} has {size} bytes")
             url = (folder / name).as_uri()
             for view, size in VIEWS.items():
                 page = browser.open(url, **size)
-                faults += [f"{name}, {view}: {fault}" for fault in look(page, url, plots)]
+                faults += [f"{name}, {view}: {fault}" for fault in look(page, url, plots, sections)]
                 picture = folder / f"{pathlib.Path(name).stem}-{view}.png"
                 page.screenshot(picture)
                 if busy_share(picture) < 0.01:

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "evpose/report/assets.h"
-
 #define EVPOSE_ASSET(name)                                                          \
   extern "C" const char evpose_asset_##name##_begin[], evpose_asset_##name##_end[]; \
   static std::string name() { return {evpose_asset_##name##_begin, evpose_asset_##name##_end}; }
@@ -15,6 +13,7 @@ EVPOSE_ASSET(viewer_css)
 EVPOSE_ASSET(viewer_js)
 EVPOSE_ASSET(picture_js)
 EVPOSE_ASSET(plots_js)
+EVPOSE_ASSET(plotly_js)
 EVPOSE_ASSET(three_js)
 EVPOSE_ASSET(orbit_js)
 
@@ -55,7 +54,7 @@ void set_viewer_pages(Server& server, const std::string& mode) {
   for (auto at = orbit.find(name); at != std::string::npos; at = orbit.find(name, at))
     orbit.replace(at, name.size(), "from './three.js'");
   server.set_page("/orbit.js", script, std::move(orbit));
-  server.set_page("/plotly.js", script, std::string(assets::plotly_js()));
+  server.set_page("/plotly.js", script, plotly_js());
   server.set_page("/mode.json", "application/json", "{\"mode\":" + quoted(mode) + "}");
   server.set_page("/favicon.ico", "image/x-icon", std::string());
 }

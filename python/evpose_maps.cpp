@@ -3,6 +3,7 @@
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <map>
 
@@ -16,6 +17,7 @@
 #include "evpose_files.h"
 
 namespace py = pybind11;
+namespace fs = std::filesystem;
 
 namespace evpose {
 namespace {
@@ -49,13 +51,13 @@ py::array_t<double> occluders_of(const ContourMap& map) {
   return out;
 }
 
-ContourMap read_map(const std::string& path, const std::string& occluders) {
-  ContourMap map = value_of(read_contour_map(path));
-  if (!occluders.empty()) map.occluders = value_of(read_ply_mesh(occluders, map.anchor));
+ContourMap read_map(const fs::path& path, const fs::path& occluders) {
+  ContourMap map = value_of(read_contour_map(path.string()));
+  if (!occluders.empty()) map.occluders = value_of(read_ply_mesh(occluders.string(), map.anchor));
   return map;
 }
 
-ContourMap build_map(const std::string& cloud_path, const std::string& output,
+ContourMap build_map(const fs::path& cloud_path, const fs::path& output,
                      const std::map<std::string, py::object>& settings, int threads) {
   map_build::BuildConfig config;
   ConfigTable table;
@@ -64,7 +66,7 @@ ContourMap build_map(const std::string& cloud_path, const std::string& output,
     if (const auto ok = table.set(key, setting_text(setting), "settings"); !ok)
       throw py::value_error(ok.error().line());
   if (threads < 1) throw py::value_error("threads: give 1 or more");
-  PointCloud cloud = value_of(read_cloud(cloud_path));
+  PointCloud cloud = value_of(read_cloud(cloud_path.string()));
   ThreadPool pool(threads);
   auto built = [&] {
     const py::gil_scoped_release release;
@@ -75,8 +77,8 @@ ContourMap build_map(const std::string& cloud_path, const std::string& output,
   }();
   if (PyErr_Occurred() != nullptr) throw py::error_already_set();
   ContourMap map = value_of(std::move(built)).map;
-  if (const auto ok = write_map_h5(output, map); !ok) throw py::value_error(ok.error().line());
-  map.source = output;
+  if (const auto ok = write_map_h5(output.string(), map); !ok) throw py::value_error(ok.error().line());
+  map.source = output.string();
   return map;
 }
 

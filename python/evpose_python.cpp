@@ -5,6 +5,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <deque>
 #include <map>
@@ -19,6 +20,7 @@
 #include "evpose_files.h"
 
 namespace py = pybind11;
+namespace fs = std::filesystem;
 
 namespace evpose {
 namespace {
@@ -36,11 +38,11 @@ Pose pose_of(const Eigen::Matrix4d& T) {
 
 class PyTracker {
  public:
-  PyTracker(const std::string& map_path, const std::string& calibration_path,
+  PyTracker(const fs::path& map_path, const fs::path& calibration_path,
             const Eigen::Matrix4d& T_map_body, TimeNs t_ns, const Eigen::Vector3d& velocity,
-            const std::string& imu_model, const std::string& occluders,
+            const fs::path& imu_model, const fs::path& occluders,
             const std::map<std::string, py::object>& settings) {
-    const CalibrationFile file = value_of(read_calibration(calibration_path));
+    const CalibrationFile file = value_of(read_calibration(calibration_path.string()));
     const CalibratedCamera chosen = value_of(choose_camera(file));
     size_ = chosen.intrinsics->size;
     TrackerSetup setup;
@@ -51,9 +53,9 @@ class PyTracker {
     has_imu_ = chosen.T_cam_imu.has_value();
     setup.motion = has_imu_ ? MotionModel::imu : MotionModel::constant_velocity;
     if (file.imu_noise) setup.imu_noise = *file.imu_noise;
-    if (!imu_model.empty()) setup.imu_noise = value_of(read_imu_noise(imu_model));
-    ContourMap map = value_of(read_contour_map(map_path));
-    if (!occluders.empty()) map.occluders = value_of(read_ply_mesh(occluders, map.anchor));
+    if (!imu_model.empty()) setup.imu_noise = value_of(read_imu_noise(imu_model.string()));
+    ContourMap map = value_of(read_contour_map(map_path.string()));
+    if (!occluders.empty()) map.occluders = value_of(read_ply_mesh(occluders.string(), map.anchor));
     setup.map = std::make_shared<const ContourMap>(std::move(map));
     TrackerConfig config;
     ConfigTable table;
@@ -170,12 +172,13 @@ PYBIND11_MODULE(evpose, m) {
       .def_readonly("points_matched", &Update::points_matched, "of these, with events near by");
   py::class_<PyTracker>(
       m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
-      .def(py::init<const std::string&, const std::string&, const Eigen::Matrix4d&, TimeNs,
-                    const Eigen::Vector3d&, const std::string&, const std::string&,
+      .def(py::init<const fs::path&, const fs::path&, const Eigen::Matrix4d&, TimeNs, const Eigen::Vector3d&,
+                    const fs::path&, const fs::path&,
                     const std::map<std::string, py::object>&>(),
            "map"_a, "calibration"_a, "T_map_body"_a, "t_ns"_a, "velocity"_a = Eigen::Vector3d(0, 0, 0),
            "imu_model"_a = "", "occluders"_a = "", "settings"_a = std::map<std::string, py::object>{},
-           "Starts at a pose. settings: keys of evpose track --dump-config")
+           "Starts at a pose. settings: keys of evpose track --dump-config, those of a poor start among them "
+           "(fusion.start_position_sigma_m)")
       .def("on_update", &PyTracker::on_update, "callback"_a, "called with each Update, in order of time")
       .def("add_events", &PyTracker::add_events, "t_us"_a, "x"_a, "y"_a, "p"_a,
            "int64 microseconds, uint16, uint16, 0 or 1; gives the updates that were made")

@@ -3,6 +3,7 @@
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <limits>
 
@@ -10,6 +11,7 @@
 #include "evpose_files.h"
 
 namespace py = pybind11;
+namespace fs = std::filesystem;
 
 namespace evpose {
 namespace {
@@ -87,8 +89,8 @@ void bind_recordings(py::module_& m) {
   using namespace py::literals;
   py::class_<Recording>(m, "Recording",
                         "A recording folder, a sequence as downloaded, or a file of events; all on the IMU's clock")
-      .def(py::init([](const std::string& path, const std::string& calibration) {
-             return value_of(open_recording(path, calibration));
+      .def(py::init([](const fs::path& path, const fs::path& calibration) {
+             return value_of(open_recording(path.string(), calibration.string()));
            }),
            "path"_a, "calibration"_a = "", "Reads and checks the small files; ValueError says what is wrong")
       .def_readonly("name", &Recording::name, "as in recording.yaml, or of the folder")

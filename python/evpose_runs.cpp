@@ -3,6 +3,7 @@
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <cmath>
 #include <map>
@@ -14,6 +15,7 @@
 #include "evpose_files.h"
 
 namespace py = pybind11;
+namespace fs = std::filesystem;
 
 namespace evpose {
 namespace {
@@ -62,16 +64,15 @@ py::object summary_of(const RunFiles& run) {
   return py::module_::import("json").attr("loads")(*content);
 }
 
-RunFiles track(const std::string& recording, const std::string& output, const std::string& map,
-               const std::string& calibration, const std::string& occluders, const std::string& init,
-               const std::pair<double, double>& init_sigma, const std::map<std::string, py::object>& settings,
-               bool replace) {
+RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
+               const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
+               const std::map<std::string, py::object>& settings, bool replace) {
   TrackRequest request;
-  request.recording = recording;
-  request.output = output;
-  request.map = map;
-  request.calibration = calibration;
-  request.occluders = occluders;
+  request.recording = recording.string();
+  request.output = output.string();
+  request.map = map.string();
+  request.calibration = calibration.string();
+  request.occluders = occluders.string();
   request.init = init;
   request.init_sigma = {init_sigma.first, init_sigma.second};
   for (const auto& [key, setting] : settings) request.assignments.push_back(key + "=" + setting_text(setting));
@@ -86,7 +87,7 @@ RunFiles track(const std::string& recording, const std::string& output, const st
   }();
   if (PyErr_Occurred() != nullptr) throw py::error_already_set();
   value_of(std::move(outcome));
-  return value_of(read_run_files(output));
+  return value_of(read_run_files(output.string()));
 }
 
 }  // namespace
@@ -94,7 +95,7 @@ RunFiles track(const std::string& recording, const std::string& output, const st
 void bind_runs(py::module_& m) {
   using namespace py::literals;
   py::class_<RunFiles>(m, "Run", "A run folder of evpose track: a row for each update; arrays are copies")
-      .def(py::init([](const std::string& folder) { return value_of(read_run_files(folder)); }), "folder"_a,
+      .def(py::init([](const fs::path& folder) { return value_of(read_run_files(folder.string())); }), "folder"_a,
            "ValueError says what is wrong")
       .def_readonly("folder", &RunFiles::folder, "where it stands")
       .def_property_readonly(

@@ -51,7 +51,7 @@ function card(row, id, title, about, figure, shape = "") {
 function table(parent, header, rows, numbers = []) {
   const cells = (tag, row) => row.map((text, i) => element(tag, { text, cls: numbers.includes(i) ? "number" : "" }));
   const scroll = element("div", { cls: "scroll", parent });
-  const body = element("table", { parent: scroll });
+  const body = element("table", { cls: numbers.length ? "figures" : "", parent: scroll });
   if (header.length) element("tr", { parent: body }, cells("th", header));
   for (const row of rows) element("tr", { parent: body }, cells("td", row));
   hintAtScroll(scroll);

@@ -116,7 +116,7 @@ void add_rows(const std::string& name, const PageJson& entry, PageJson* rows) {
   if (entry.is_object() && entry.contains("given")) {
     const double given = entry["given"], sigma = entry["given_sigma"], found = entry["found"];
     const std::string change = sigma > 0 ? format("%+.2f", (found - given) / sigma) : "";
-    rows->push_back({name, format("%.6g", given), format("%.2g", sigma), format("%.6g", found),
+    rows->push_back({name, format("%.5g", given), format("%.2g", sigma), format("%.5g", found),
                      format("%.2g", entry["sigma"].get<double>()), change});
     return;
   }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/images/viewer_run.png and viewer_live.png: the pages of `evpose view` and `evpose serve --view` of room_spiral."""
+"""docs/images/viewer_run.png, viewer_live.png: the pages of `evpose view` and `evpose serve --view` of room_spiral."""
 import signal
 import socket
 import subprocess
@@ -14,7 +14,12 @@ import chromium  # noqa: E402
 WIDTH, HEIGHT = 1440, 900
 SHOWN_S = 1.7  # of the recorded run
 DATA = "(document.documentElement ?? { dataset: {} }).dataset"
-SEEK = """(slider => { slider.value = %s; slider.dispatchEvent(new Event("input")); })(document.getElementById("time"))"""
+SEEK = """
+(slider => {
+  slider.value = %s;
+  slider.dispatchEvent(new Event("input"));
+})(document.getElementById("time"))
+"""
 
 
 def free_port():
@@ -64,6 +69,7 @@ def make(bench):
     with chromium.Browser(name) as browser:
         shoot(bench, browser, output, ["view", run, "--port", free_port()],
               f"Math.abs({DATA}.pictured - {SHOWN_S}) < 0.1", SEEK % SHOWN_S)
-        live = ["serve", recording.folder, *map_words, "--init", "groundtruth", "--set", "replay.speed=0.05", "--view", free_port()]
+        live = ["serve", recording.folder, *map_words, "--init", "groundtruth", "--set", "replay.speed=0.05",
+                "--view", free_port()]
         shoot(bench, browser, bench.image("viewer_live.png"), live, f"Number({DATA}.t) > {SHOWN_S}")
     return output

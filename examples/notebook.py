@@ -42,7 +42,7 @@ bins = np.arange(t_us[0], t_us[-1] + 10_000, 10_000)
 rate.plot(1e-6 * bins[:-1], np.histogram(t_us, bins)[0] / 1e4)
 rate.set(xlabel="time [s]", ylabel="events [million / s]")
 middle = slice(*np.searchsorted(t_us, [t_us[len(t_us) // 2], t_us[len(t_us) // 2] + 20_000]))
-picture.scatter(x[middle], y[middle], s=1, c=np.where(p[middle] == 1, "tab:red", "tab:blue"))
+picture.scatter(x[middle], y[middle], s=0.3, c=np.where(p[middle] == 1, "tab:red", "tab:blue"))
 picture.set(xlim=(0, recording.width), ylim=(recording.height, 0), aspect="equal", title="events of 20 ms")
 show("recording")
 

@@ -154,11 +154,12 @@ class ModuleTest(unittest.TestCase):
                 raise
             self.skipTest("matplotlib is missing: scripts/packages.sh test")
         out = self.folder / "notebook"
-        done = subprocess.run([sys.executable, SOURCE / "examples/notebook.py"], capture_output=True, text=True, timeout=100,
-                              env={"PYTHONPATH": str(MODULE), "MPLBACKEND": "Agg", "EVPOSE_RECORDING": str(self.folder),
-                                   "EVPOSE_OUTPUT": str(out), "HOME": str(self.folder)})
+        done = subprocess.run([sys.executable, SOURCE / "examples/notebook.py"], capture_output=True, text=True,
+                              env={"PYTHONPATH": str(MODULE), "MPLBACKEND": "Agg", "HOME": str(self.folder),
+                                   "EVPOSE_RECORDING": str(self.folder), "EVPOSE_OUTPUT": str(out)}, timeout=100)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "mm beside: tracking", "the last is tracking"):
+        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "mm beside: tracking",
+                      "the last is tracking"):
             self.assertIn(words, done.stdout)
         for name in ("recording", "track", "biases"):
             self.assertGreater((out / f"{name}.png").stat().st_size, 5000)

@@ -119,7 +119,8 @@ def main():
     subprocess.run([make_reports, folder], check=True)
     faults = []
     with chromium.Browser(program) as browser:
-        for name, plots, sections in (("run/report.html", RUN_PLOTS, RUN_SECTIONS), ("eval.html", EVAL_PLOTS, EVAL_SECTIONS)):
+        for name, plots, sections in (("run/report.html", RUN_PLOTS, RUN_SECTIONS),
+                                      ("eval.html", EVAL_PLOTS, EVAL_SECTIONS)):
             if (size := (folder / name).stat().st_size) > MOST_BYTES:
                 faults.append(f"{name} has {size} bytes")
             url = (folder / name).as_uri()

@@ -127,8 +127,8 @@ def plays(page):
     expect(float(page.run(f"{DATA}.t")) == 0, "starts at the run's start")
     page.run("document.getElementById('speed').value = 2, document.getElementById('play').click()")
     expect(page.wait_for(f"Number({DATA}.t) > 0.1", 30), "plays")
-    expect(page.wait_for(f"{slider}.value === {slider}.max && document.getElementById('play').textContent === 'play'", 60),
-           "plays to the end and stops")
+    stopped = "document.getElementById('play').textContent === 'play'"
+    expect(page.wait_for(f"{slider}.value === {slider}.max && {stopped}", 60), "plays to the end and stops")
     expect(page.wait_for(f"Number({DATA}.pictures) > 2 && Number({DATA}.matched) > 50", 30), "pictures of the run")
     expect(page.run(COLOURS % "picture") > 3, "the picture shows events")
 

@@ -5,7 +5,8 @@
 /** The area between two lines that have times of their own. */
 function between(low, high, ink, name) {
   return {
-    type: "scatter", mode: "lines", x: low.t.concat(high.t.slice().reverse()), y: low.y.concat(high.y.slice().reverse()),
+    type: "scatter", mode: "lines",
+    x: low.t.concat(high.t.slice().reverse()), y: low.y.concat(high.y.slice().reverse()),
     fill: "toself", fillcolor: faint(ink, 0.13), line: { width: 0, color: faint(ink, 0.4) }, hoverinfo: "skip",
     legendgroup: name, showlegend: false,
   };
@@ -22,16 +23,18 @@ function rangeWithin(lines) {
   return [from - margin, to + margin];
 }
 
-const course = (lines, unit, more = {}) => () => {
+const course = (lines, unit) => () => {
   const data = [];
   for (const l of lines) {
     if (l.low) data.push(between(l.low, l.high, l.ink, l.name));
     if (l.truth) {
-      data.push(line(`${l.name}, ground truth`, l.truth, "truth", { legendgroup: l.name, showlegend: false, line: { width: 3, color: faint("truth", 0.45) } }));
+      const grey = { legendgroup: l.name, showlegend: false, line: { width: 3, color: faint("truth", 0.45) } };
+      data.push(line(`${l.name}, ground truth`, l.truth, "truth", grey));
     }
     data.push(line(l.name, l.series, l.ink, { legendgroup: l.name }));
   }
-  return { data, layout: layout({ shapes: lostShapes(), xaxis: time(), yaxis: axis(unit, { range: rangeWithin(lines) }), ...more }) };
+  const axes = { xaxis: time(), yaxis: axis(unit, { range: rangeWithin(lines) }) };
+  return { data, layout: layout({ shapes: lostShapes(), ...axes }) };
 };
 
 function start(page) {
@@ -47,7 +50,8 @@ function motion(page) {
   const { velocity, attitude } = run.motion;
   card(row, "velocity", "Velocity in the map", "shaded: 3 sigma of the covariance", course(velocity, "velocity [m/s]"));
   const beside = attitude.some((a) => a.truth) ? "; grey: ground truth" : "";
-  card(row, "attitude", "Attitude of the body", `turned about x (roll), then y (pitch), then z (yaw) of the map${beside}`, course(attitude, "angle [deg]"));
+  const about = `turned about x (roll), then y (pitch), then z (yaw) of the map${beside}`;
+  card(row, "attitude", "Attitude of the body", about, course(attitude, "angle [deg]"));
 }
 
 function biases(page) {
@@ -60,7 +64,8 @@ function biases(page) {
 function calibration(page) {
   const c = run.calibration;
   if (!c) return;
-  const row = section(page, "Calibration", "Estimated on the way, from what was given and its sigma. Give the run's calibration.yaml to the next flight with this camera.");
+  const row = section(page, "Calibration", "Estimated on the way, from what was given and its sigma. "
+    + "Give the run's calibration.yaml to the next flight with this camera.");
   const box = element("section", { cls: "card wide", parent: row });
   element("h3", { text: "Given and found", parent: box });
   table(box, ["", "given", "sigma", "found", "sigma", "change in given sigmas"], c.table, [1, 2, 3, 4, 5]);

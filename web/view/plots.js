@@ -8,9 +8,12 @@ const PLOTS = [
   { id: "plot-latency", title: "delay, ms", lines: [["latency_ms", "", 1]], cut: true },
   { id: "plot-sigma", title: "sigma: mm, hundredths of a degree",
     lines: [["cxx", "x", sigma], ["cyy", "y", sigma], ["czz", "z", sigma], ["rotation_deg", "rotation", 100]] },
-  { id: "plot-gyro", title: "gyroscope's bias, mrad/s", lines: [["bgx", "x", 1000], ["bgy", "y", 1000], ["bgz", "z", 1000]] },
-  { id: "plot-accel", title: "accelerometer's bias, mm/s²", lines: [["bax", "x", 1000], ["bay", "y", 1000], ["baz", "z", 1000]] },
-  { id: "plot-points", title: "map points: chosen, matched", lines: [["points", "chosen", 1], ["matched", "matched", 1]] },
+  { id: "plot-gyro", title: "gyroscope's bias, mrad/s",
+    lines: [["bgx", "x", 1000], ["bgy", "y", 1000], ["bgz", "z", 1000]] },
+  { id: "plot-accel", title: "accelerometer's bias, mm/s²",
+    lines: [["bax", "x", 1000], ["bay", "y", 1000], ["baz", "z", 1000]] },
+  { id: "plot-points", title: "map points: chosen, matched",
+    lines: [["points", "chosen", 1], ["matched", "matched", 1]] },
 ];
 const INK = ["#4cc2ff", "#ffb020", "#3ddc84", "#ff7ab6"];
 const MOST = 1200; // values of a line
@@ -19,7 +22,7 @@ const markAt = (t) => (t === null ? [] : [{
   type: "line", x0: t, x1: t, yref: "paper", y0: 0, y1: 1, line: { color: "#dbe3ec", width: 1 },
 }]);
 
-/** A few updates that took long must not flatten all others: the range ends above 99 % of the values, and it is said. */
+/** A few updates that took long must not flatten all others: the range ends above 99 % of the values, and says so. */
 function cutRange(plot, values) {
   const sorted = values.filter((v) => v !== null).sort((a, b) => a - b);
   if (!plot.cut || sorted.length < 50) return {};
@@ -34,7 +37,9 @@ function layout(plot, range, note, now) {
     font: { size: 10, color: "#8d9aa8" }, showlegend: plot.lines.length > 1,
     legend: { orientation: "h", x: 1, xanchor: "right", y: 1.16, bgcolor: "rgba(0,0,0,0)" },
     xaxis: { gridcolor: "#2c3540", zeroline: false, fixedrange: true },
-    yaxis: { gridcolor: "#2c3540", zeroline: false, fixedrange: true, ...(range ? { range } : { rangemode: "tozero" }) },
+    yaxis: {
+      gridcolor: "#2c3540", zeroline: false, fixedrange: true, ...(range ? { range } : { rangemode: "tozero" }),
+    },
     shapes: markAt(now),
   };
 }
@@ -50,7 +55,8 @@ export function drawPlots(rows, at, now) {
       return number === null ? null : typeof scale === "function" ? scale(number) : scale * number;
     };
     const data = plot.lines.map(([name, label, scale], i) => ({
-      x: t, y: part.map((row) => value(row, name, scale)), name: label, mode: "lines", line: { width: 1.2, color: INK[i] }, hoverinfo: "x+y",
+      x: t, y: part.map((row) => value(row, name, scale)), name: label, mode: "lines",
+      line: { width: 1.2, color: INK[i] }, hoverinfo: "x+y",
     }));
     const { range, note } = cutRange(plot, data[0].y);
     Plotly.react(plot.id, data, layout(plot, range, note, now), { displayModeBar: false, responsive: true });

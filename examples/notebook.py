@@ -99,8 +99,10 @@ show("biases")
 # A pose that is known to a few centimetres and a degree or two per axis is searched before it is tracked.
 
 # %%
-first = np.searchsorted(truth_ns, recording.first_ns)
-at, start = truth_ns[first], truth[first]
+at = recording.first_ns
+first = np.searchsorted(truth_ns, at)
+start = truth[first].copy()
+start[:3, 3] = [np.interp(at, truth_ns, truth[:, axis, 3]) for axis in range(3)]
 
 
 def quaternion(T):

@@ -158,7 +158,7 @@ class ModuleTest(unittest.TestCase):
                               env={"PYTHONPATH": str(MODULE), "MPLBACKEND": "Agg", "HOME": str(self.folder),
                                    "EVPOSE_RECORDING": str(self.folder), "EVPOSE_OUTPUT": str(out)}, timeout=100)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "mm beside: tracking",
+        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "from 30 mm beside: ",
                       "the last is tracking"):
             self.assertIn(words, done.stdout)
         for name in ("recording", "track", "biases"):

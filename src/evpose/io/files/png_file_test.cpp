@@ -13,20 +13,27 @@
 namespace evpose {
 namespace {
 
-TEST(Png, ColoursDecodeToTheSameImage) {
-  RgbImage image(5, 3);
-  std::iota(image.rgb.begin(), image.rgb.end(), std::uint8_t{7});
+/// Sixteen colours and all: one with a palette, one without.
+class PngColours : public testing::TestWithParam<int> {};
+
+TEST_P(PngColours, DecodeToTheSameImage) {
+  RgbImage image(40, 30);
+  for (std::size_t i = 0; i < image.rgb.size(); ++i)
+    image.rgb[i] = static_cast<std::uint8_t>(i * 37 % static_cast<std::size_t>(GetParam()) * 7);
   const std::string bytes = encode_png(image);
+  constexpr std::size_t kColourType = 25;  // of the header
+  EXPECT_EQ(bytes[kColourType], GetParam() < 256 ? PNG_COLOR_TYPE_PALETTE : PNG_COLOR_TYPE_RGB);
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
   png.format = PNG_FORMAT_RGB;
-  ASSERT_EQ(png.width, 5u);
-  ASSERT_EQ(png.height, 3u);
-  std::vector<std::uint8_t> rgb(image.rgb.size());
-  ASSERT_NE(png_image_finish_read(&png, nullptr, rgb.data(), 0, nullptr), 0);
-  EXPECT_EQ(rgb, image.rgb);
+  ASSERT_EQ(png.width, 40u);
+  ASSERT_EQ(png.height, 30u);
+  std::vector<std::uint8_t> decoded(PNG_IMAGE_SIZE(png));
+  ASSERT_NE(png_image_finish_read(&png, nullptr, decoded.data(), 0, nullptr), 0);
+  EXPECT_EQ(decoded, image.rgb);
 }
+INSTANTIATE_TEST_SUITE_P(FewAndMany, PngColours, testing::Values(16, 100'003));
 
 /// The samples of a grey file, as libpng gives them back.
 template <class T>

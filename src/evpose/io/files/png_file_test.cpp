@@ -7,22 +7,24 @@
 #include <algorithm>
 #include <cstring>
 #include <numeric>
+#include <random>
 
 #include "evpose/io/files/test_files.h"
 
 namespace evpose {
 namespace {
 
-/// Sixteen colours and all: one with a palette, one without.
+/// Values of each channel: eight colours, which have a palette, or a thousand, which have none.
 class PngColours : public testing::TestWithParam<int> {};
 
 TEST_P(PngColours, DecodeToTheSameImage) {
   RgbImage image(40, 30);
-  for (std::size_t i = 0; i < image.rgb.size(); ++i)
-    image.rgb[i] = static_cast<std::uint8_t>(i * 37 % static_cast<std::size_t>(GetParam()) * 7);
+  std::mt19937 random(1);
+  for (std::uint8_t& byte : image.rgb)
+    byte = static_cast<std::uint8_t>(random() % static_cast<unsigned>(GetParam()));
   const std::string bytes = encode_png(image);
   constexpr std::size_t kColourType = 25;  // of the header
-  EXPECT_EQ(bytes[kColourType], GetParam() < 256 ? PNG_COLOR_TYPE_PALETTE : PNG_COLOR_TYPE_RGB);
+  EXPECT_EQ(bytes[kColourType], GetParam() == 2 ? PNG_COLOR_TYPE_PALETTE : PNG_COLOR_TYPE_RGB);
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
@@ -33,7 +35,7 @@ TEST_P(PngColours, DecodeToTheSameImage) {
   ASSERT_NE(png_image_finish_read(&png, nullptr, decoded.data(), 0, nullptr), 0);
   EXPECT_EQ(decoded, image.rgb);
 }
-INSTANTIATE_TEST_SUITE_P(FewAndMany, PngColours, testing::Values(16, 100'003));
+INSTANTIATE_TEST_SUITE_P(FewAndMany, PngColours, testing::Values(2, 256));
 
 /// The samples of a grey file, as libpng gives them back.
 template <class T>

@@ -8,7 +8,8 @@
 
 A page keeps its words; the figures between its marks and its first line are written anew. What was measured with this
 program is kept in SCRATCH/measured and not measured again, so that an interrupted run goes on where it was; recordings that
-are simulated stay in SCRATCH/recordings. Needs a Python with numpy and h5py, and chromium for the pictures of maps.
+are simulated stay in SCRATCH/recordings. Needs a Python with numpy and h5py, and chromium for the pictures of maps and of
+the viewer.
 """
 import argparse
 import importlib
@@ -41,6 +42,7 @@ BENCHMARKS = {
     "update-picture": ("pictures", "make_update", "docs/images/update.svg, overlay.png", "10 s"),
     "error-picture": ("error_picture", "make", "docs/images/fusion_error.svg", "10 s"),
     "landing-pictures": ("landing_pictures", "make", "docs/images/landing_*.png", "3 min"),
+    "viewer-pictures": ("viewer_pictures", "make", "docs/images/viewer_*.png", "1 min"),
     "map-pictures": ("map_pictures", "make", "docs/images/map_*.png", "2 min"),
 }
 

@@ -5,6 +5,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <deque>
 #include <map>
@@ -16,21 +17,16 @@
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/ply.h"
 #include "evpose/tracker/tracker.h"
+#include "evpose_files.h"
 
 namespace py = pybind11;
+namespace fs = std::filesystem;
 
 namespace evpose {
 namespace {
 
 template <class T>
 using Column = py::array_t<T, py::array::c_style | py::array::forcecast>;
-
-/// The value, or a Python ValueError with the one line that says what is wrong.
-template <class T>
-T value_of(Expected<T> expected) {
-  if (!expected) throw py::value_error(expected.error().line());
-  return std::move(*expected);
-}
 
 Pose pose_of(const Eigen::Matrix4d& T) {
   const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
@@ -42,11 +38,11 @@ Pose pose_of(const Eigen::Matrix4d& T) {
 
 class PyTracker {
  public:
-  PyTracker(const std::string& map_path, const std::string& calibration_path,
+  PyTracker(const fs::path& map_path, const fs::path& calibration_path,
             const Eigen::Matrix4d& T_map_body, TimeNs t_ns, const Eigen::Vector3d& velocity,
-            const std::string& imu_model, const std::string& occluders,
+            const fs::path& imu_model, const fs::path& occluders,
             const std::map<std::string, py::object>& settings) {
-    const CalibrationFile file = value_of(read_calibration(calibration_path));
+    const CalibrationFile file = value_of(read_calibration(calibration_path.string()));
     const CalibratedCamera chosen = value_of(choose_camera(file));
     size_ = chosen.intrinsics->size;
     TrackerSetup setup;
@@ -57,18 +53,16 @@ class PyTracker {
     has_imu_ = chosen.T_cam_imu.has_value();
     setup.motion = has_imu_ ? MotionModel::imu : MotionModel::constant_velocity;
     if (file.imu_noise) setup.imu_noise = *file.imu_noise;
-    if (!imu_model.empty()) setup.imu_noise = value_of(read_imu_noise(imu_model));
-    ContourMap map = value_of(read_contour_map(map_path));
-    if (!occluders.empty()) map.occluders = value_of(read_ply_mesh(occluders, map.anchor));
+    if (!imu_model.empty()) setup.imu_noise = value_of(read_imu_noise(imu_model.string()));
+    ContourMap map = value_of(read_contour_map(map_path.string()));
+    if (!occluders.empty()) map.occluders = value_of(read_ply_mesh(occluders.string(), map.anchor));
     setup.map = std::make_shared<const ContourMap>(std::move(map));
     TrackerConfig config;
     ConfigTable table;
     describe(table, config);
-    for (const auto& [key, setting] : settings) {
-      std::string word = py::str(setting);
-      if (py::isinstance<py::bool_>(setting)) word = setting.cast<bool>() ? "true" : "false";
-      if (const auto ok = table.set(key, word, "settings"); !ok) throw py::value_error(ok.error().line());
-    }
+    for (const auto& [key, setting] : settings)
+      if (const auto ok = table.set(key, setting_text(setting), "settings"); !ok)
+        throw py::value_error(ok.error().line());
     tracker_ = value_of(Tracker::create(setup, config, {t_ns, pose_of(T_map_body), velocity, {0, 0, 0}}));
     tracker_->on_update([this](const Update& u) { made_.push_back(u); });
   }
@@ -178,16 +172,20 @@ PYBIND11_MODULE(evpose, m) {
       .def_readonly("points_matched", &Update::points_matched, "of these, with events near by");
   py::class_<PyTracker>(
       m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
-      .def(py::init<const std::string&, const std::string&, const Eigen::Matrix4d&, TimeNs,
-                    const Eigen::Vector3d&, const std::string&, const std::string&,
+      .def(py::init<const fs::path&, const fs::path&, const Eigen::Matrix4d&, TimeNs, const Eigen::Vector3d&,
+                    const fs::path&, const fs::path&,
                     const std::map<std::string, py::object>&>(),
            "map"_a, "calibration"_a, "T_map_body"_a, "t_ns"_a, "velocity"_a = Eigen::Vector3d(0, 0, 0),
            "imu_model"_a = "", "occluders"_a = "", "settings"_a = std::map<std::string, py::object>{},
-           "Starts at a pose. settings: keys of evpose track --dump-config")
+           "Starts at a pose. settings: keys of evpose track --dump-config, those of a poor start among them "
+           "(fusion.start_position_sigma_m)")
       .def("on_update", &PyTracker::on_update, "callback"_a, "called with each Update, in order of time")
       .def("add_events", &PyTracker::add_events, "t_us"_a, "x"_a, "y"_a, "p"_a,
            "int64 microseconds, uint16, uint16, 0 or 1; gives the updates that were made")
       .def("add_imu", &PyTracker::add_imu, "t_ns"_a, "samples"_a,
            "int64 ns of shape (n,); (n, 6): gyro rad/s, accel m/s^2; gives the updates that were made")
       .def_property_readonly("has_imu", &PyTracker::has_imu, "the calibration knows where the IMU sits");
+  bind_recordings(m);
+  bind_maps(m);
+  bind_runs(m);
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The Python module: module_test.py FOLDER_OF_MODULE SOURCE"""
+import os
 import pathlib
 import subprocess
 import sys
@@ -79,6 +80,89 @@ class ModuleTest(unittest.TestCase):
             tracker.add_imu([1], [[1, 2, 3]])
         with self.assertRaisesRegex(ValueError, "not finite"):
             tracker.add_imu([1], [[1, 2, 3, 4, 5, np.nan]])
+
+    def test_recordings_are_arrays(self):
+        r, read = self.recording, evpose.Recording(self.folder)
+        t, x, y, p = read.events()
+        for ours, theirs in ((t, r.t), (x, r.x), (y, r.y), (p, r.p)):
+            np.testing.assert_array_equal(ours, theirs)
+        self.assertEqual((t.dtype, x.dtype, p.dtype), (np.int64, np.uint16, np.uint8))
+        part = read.events(start_s=0.1, duration_s=0.05)[0]
+        inside = t[(t * 1000 >= read.first_ns + 100_000_000) & (t * 1000 < read.first_ns + 150_000_000)]
+        np.testing.assert_array_equal(part, inside)
+        self.assertGreater(len(part), 0)
+        imu_t, imu = read.imu()
+        np.testing.assert_array_equal(imu_t, r.imu_t_ns)
+        np.testing.assert_allclose(imu, r.imu, atol=1e-7)
+        truth_t, truth = read.groundtruth()
+        np.testing.assert_allclose(truth[:, :3, 3], position(truth_t * 1e-9), atol=1e-8)
+        self.assertEqual((read.width, read.height, read.has_imu), (160, 120, True))
+        self.assertEqual(read.T_cam_body.shape, (4, 4))
+        self.assertTrue(read.map.endswith("contours.ply"))
+        with self.assertRaisesRegex(ValueError, "nowhere"):
+            evpose.Recording("nowhere")
+
+    def test_maps_are_arrays(self):
+        read = evpose.Map(self.folder / "contours.ply")
+        n = len(read.points)
+        self.assertGreater(n, 0.9 * len(self.recording.contours))
+        self.assertEqual((read.tangents.shape, read.sigma.shape, len(read.kind)), ((n, 3), (n,), n))
+        np.testing.assert_allclose(np.linalg.norm(read.tangents, axis=1), 1, atol=1e-5)
+        np.testing.assert_allclose(read.points[:, 0], 3, atol=1e-6)  # the wall
+        self.assertEqual(read.occluders.shape, (0, 3, 3))
+
+    def test_maps_are_built_from_clouds(self):
+        random, n = np.random.default_rng(2), 12_000
+        a, b = random.uniform(0, 2, (2, n))
+        faces = [np.stack([a, b, 0 * a], 1), np.stack([a, 0 * a, b], 1), np.stack([0 * a, a, b], 1)]
+        cloud = np.vstack(faces) + random.normal(0, 1e-3, (3 * n, 3))
+        header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(cloud)}\n"
+        header += "".join(f"property float {name}\n" for name in "xyz") + "end_header\n"
+        (self.folder / "cloud.ply").write_bytes(header.encode() + cloud.astype("<f4").tobytes())
+        built = evpose.build_map(self.folder / "cloud.ply", self.folder / "built.h5", {"point_spacing": 0.05})
+        creases = built.points[np.array(built.kind) == "crease"]
+        self.assertGreater(len(creases), 60)
+        self.assertLess(np.median(np.sort(np.abs(creases), axis=1)[:, 1]), 0.005)  # on the axes: two numbers are 0
+        again = evpose.Map(self.folder / "built.h5")
+        np.testing.assert_allclose(again.points, built.points)
+        with self.assertRaisesRegex(ValueError, "settings"):
+            evpose.build_map(self.folder / "cloud.ply", self.folder / "built.h5", {"no_such_key": 1})
+
+    def test_runs_are_arrays(self):
+        run = evpose.track(self.folder, self.folder / "run", settings={"rate_hz": 100})
+        n = len(run.t_ns)
+        self.assertAlmostEqual(n, 59, delta=2)
+        self.assertEqual((run.T_map_body.shape, run.covariance.shape, len(run.health)), ((n, 4, 4), (n, 6, 6), n))
+        errors = np.linalg.norm(run.T_map_body[:, :3, 3] - position(run.t_ns * 1e-9), axis=1)
+        self.assertLess(np.median(errors[run.valid]), 0.05)
+        table = run.table()
+        np.testing.assert_allclose(table["x_m"], run.T_map_body[:, 0, 3])
+        self.assertEqual(len(run.table("latency.csv")["t_s"]), n)
+        self.assertEqual(run.summary["updates"], n)
+        again = evpose.Run(run.folder)
+        np.testing.assert_array_equal(again.T_map_body, run.T_map_body)
+        with self.assertRaisesRegex(ValueError, "--force|replace"):
+            evpose.track(self.folder, self.folder / "run")
+        with self.assertRaisesRegex(ValueError, "no run folder"):
+            evpose.Run("nowhere")
+
+    def test_the_notebook_runs(self):
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            if os.environ.get("CI") == "true":
+                raise
+            self.skipTest("matplotlib is missing: scripts/packages.sh test")
+        out = self.folder / "notebook"
+        done = subprocess.run([sys.executable, SOURCE / "examples/notebook.py"], capture_output=True, text=True,
+                              env={"PYTHONPATH": str(MODULE), "MPLBACKEND": "Agg", "HOME": str(self.folder),
+                                   "EVPOSE_RECORDING": str(self.folder), "EVPOSE_OUTPUT": str(out)}, timeout=100)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "from 30 mm beside: ",
+                      "the last is tracking"):
+            self.assertIn(words, done.stdout)
+        for name in ("recording", "track", "biases"):
+            self.assertGreater((out / f"{name}.png").stat().st_size, 5000)
 
     def test_the_example_runs(self):
         out = self.folder / "out.tum"

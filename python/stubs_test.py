@@ -17,21 +17,28 @@ import evpose  # noqa: E402
 
 def stub_type(text, taken):
     """The type that a stub gives for one of pybind11's, which is taken from the caller or handed to it."""
-    text = re.sub(r"numpy\.ndarray(\[numpy\.\w+(\[[^]]*\])?\])?", "ArrayLike" if taken else "NDArray[np.float64]", text)
-    return text.replace("evpose.", "").replace("List[", "list[").replace("Dict[str, object]", "dict[str, Any]")
+    def array(found):
+        kind = (found[1] or "float64").replace("numpy.", "").replace("bool", "bool_")
+        return "ArrayLike" if taken else f"NDArray[np.{kind}]"
+
+    text = re.sub(r"numpy\.ndarray(?:\[((?:numpy\.)?\w+)(?:\[[^]]*\])?\])?", array, text)
+    for other, ours in (("evpose.", ""), ("List[", "list["), ("Dict[", "dict["), ("Tuple[", "tuple["),
+                        ("os.PathLike", "str | PathLike[str]")):
+        text = text.replace(other, ours)
+    return re.sub(r"\bobject\b", "Any", text)
 
 
-def signature(documentation):
+def signature(documentation, method=True):
     """Parameters with types, result and text of a function that pybind11 documents."""
     head, _, text = documentation.partition("\n")
     function = ast.parse("def " + (head if head[0] != "(" else "f" + head) + ": ...").body[0]
-    arguments = [(a.arg, stub_type(ast.unparse(a.annotation), True)) for a in function.args.args[1:]]
+    arguments = [(a.arg, stub_type(ast.unparse(a.annotation), True)) for a in function.args.args[method:]]
     defaults = [ast.unparse(d) if isinstance(d, (ast.Constant, ast.Dict)) else "..." for d in function.args.defaults]
     return arguments, defaults, stub_type(ast.unparse(function.returns), False), text.strip()
 
 
-def stub_signature(function):
-    arguments = [(a.arg, ast.unparse(a.annotation)) for a in function.args.args[1:]]
+def stub_signature(function, method=True):
+    arguments = [(a.arg, ast.unparse(a.annotation)) for a in function.args.args[method:]]
     return (arguments, [ast.unparse(d) for d in function.args.defaults], ast.unparse(function.returns),
             ast.get_docstring(function))
 
@@ -47,13 +54,18 @@ class StubsTest(unittest.TestCase):
     def setUpClass(cls):
         cls.tree = ast.parse(STUBS.read_text())
         cls.classes = {node.name: node for node in cls.tree.body if isinstance(node, ast.ClassDef)}
+        cls.functions = {node.name: node for node in cls.tree.body if isinstance(node, ast.FunctionDef)}
 
     def test_names_of_the_module(self):
         names = {name for name in vars(evpose) if not name.startswith("_")}
-        self.assertEqual(names, set(self.classes))
-        self.assertTrue(all(isinstance(vars(evpose)[name], type) for name in names))
+        self.assertEqual(names, set(self.classes) | set(self.functions))
+        self.assertEqual({name for name in names if isinstance(vars(evpose)[name], type)}, set(self.classes))
         self.assertEqual(ast.get_docstring(self.tree), evpose.__doc__)
         self.assertIsInstance(evpose.__version__, str)
+
+    def test_functions_of_the_module(self):
+        for name, node in self.functions.items():
+            self.assertEqual(stub_signature(node, False), signature(getattr(evpose, name).__doc__, False), name)
 
     def test_members_of_the_classes(self):
         for name, node in self.classes.items():

@@ -39,6 +39,7 @@ test=(
   python3-h5py         # makes broken recordings, reads our maps
   python3-rosbag       # reads our ROS bags
   python3-dev pybind11-dev  # the Python module
+  python3-matplotlib   # plots of the example notebook
   pkg-config libroscpp-dev libtf2-ros-dev libtopic-tools-dev libsensor-msgs-dev libnav-msgs-dev libgeometry-msgs-dev
   libdiagnostic-msgs-dev libstd-srvs-dev libtf2-msgs-dev  # the ROS node
   python3-rosmaster python3-rospy python3-sensor-msgs python3-nav-msgs python3-geometry-msgs python3-diagnostic-msgs

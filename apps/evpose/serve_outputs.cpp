@@ -77,7 +77,10 @@ void Outputs::add(const Update& u, TimeNs data_to_monotonic, const Tracker& trac
   health_ = u.health;
   ++updates_[static_cast<std::size_t>(u.health)];
   if (!u.reason.empty()) log_detail(text(to_string(u.health), ": ", u.reason));
-  if (run_ && u.t > recorded_until_) run_->add(u);
+  if (run_ && u.t > recorded_until_) {
+    run_->add(u);
+    run_->add_calibration(u.t, tracker.calibration());
+  }
   recorded_until_ = std::max(recorded_until_, u.t);
 }
 

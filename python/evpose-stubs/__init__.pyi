@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """6-DoF pose from an event camera and an IMU against a prior 3D map of contours"""
+from os import PathLike
 from typing import Any, Callable
 
 import numpy as np
@@ -55,16 +56,16 @@ class Tracker:
 
     def __init__(
         self,
-        map: str,
-        calibration: str,
+        map: str | PathLike[str],
+        calibration: str | PathLike[str],
         T_map_body: ArrayLike,
         t_ns: int,
         velocity: ArrayLike = ...,
-        imu_model: str = "",
-        occluders: str = "",
+        imu_model: str | PathLike[str] = "",
+        occluders: str | PathLike[str] = "",
         settings: dict[str, Any] = {},
     ) -> None:
-        """Starts at a pose. settings: keys of evpose track --dump-config"""
+        """Starts at a pose. settings: keys of evpose track --dump-config, those of a poor start among them (fusion.start_position_sigma_m)"""
     def on_update(self, callback: Callable[[Update], None]) -> None:
         """called with each Update, in order of time"""
     def add_events(self, t_us: ArrayLike, x: ArrayLike, y: ArrayLike, p: ArrayLike) -> list[Update]:
@@ -74,3 +75,135 @@ class Tracker:
     @property
     def has_imu(self) -> bool:
         """the calibration knows where the IMU sits"""
+
+class Recording:
+    """A recording folder, a sequence as downloaded, or a file of events; all on the IMU's clock"""
+
+    def __init__(self, path: str | PathLike[str], calibration: str | PathLike[str] = '') -> None:
+        """Reads and checks the small files; ValueError says what is wrong"""
+    @property
+    def name(self) -> str:
+        """as in recording.yaml, or of the folder"""
+    @property
+    def folder(self) -> str:
+        """or file"""
+    @property
+    def has_imu(self) -> bool:
+        """there are IMU samples"""
+    @property
+    def first_ns(self) -> int:
+        """begin of what events and IMU have in common"""
+    @property
+    def last_ns(self) -> int:
+        """its end"""
+    @property
+    def calibration(self) -> str:
+        """file; empty: none"""
+    @property
+    def imu_model(self) -> str:
+        """file; empty: none"""
+    @property
+    def width(self) -> int:
+        """px"""
+    @property
+    def height(self) -> int:
+        """px"""
+    @property
+    def T_cam_body(self) -> NDArray[np.float64]:
+        """4x4"""
+    @property
+    def map(self) -> str:
+        """file of its own; empty: none"""
+    def events(
+        self,
+        start_s: float = 0.0,
+        duration_s: float = ...,
+    ) -> tuple[NDArray[np.int64], NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint8]]:
+        """Arrays t (us), x, y, p (0 or 1), of a part if asked; in the order that Tracker.add_events takes them"""
+    def imu(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Arrays t (ns) and (n, 6): gyro rad/s, accel m/s^2; in the order that Tracker.add_imu takes them"""
+    def groundtruth(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Arrays t (ns) and T_map_body (n, 4, 4)"""
+
+class Map:
+    """The prior map: points along contours, in the map's frame; arrays are copies"""
+
+    def __init__(self, path: str | PathLike[str], occluders: str | PathLike[str] = '') -> None:
+        """map.h5, contours as PLY or PCD; a PLY mesh that hides"""
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(n, 3), m"""
+    @property
+    def tangents(self) -> NDArray[np.float64]:
+        """(n, 3), unit, along the contour"""
+    @property
+    def sigma(self) -> NDArray[np.float64]:
+        """of each point across its contour, m"""
+    @property
+    def length(self) -> NDArray[np.float64]:
+        """of contour that each point stands for, m"""
+    @property
+    def contour(self) -> NDArray[np.int32]:
+        """number of each point's contour; -1: none"""
+    @property
+    def kind(self) -> list[str]:
+        """of each point: unknown, crease, boundary, marking, cylinder_axis or shadow"""
+    @property
+    def occluders(self) -> NDArray[np.float64]:
+        """(n, 3, 3): corners of triangles, m"""
+    @property
+    def frame(self) -> str:
+        """name of the map's frame"""
+    @property
+    def source(self) -> str:
+        """file"""
+
+class Run:
+    """A run folder of evpose track: a row for each update; arrays are copies"""
+
+    def __init__(self, folder: str | PathLike[str]) -> None:
+        """ValueError says what is wrong"""
+    @property
+    def folder(self) -> str:
+        """where it stands"""
+    @property
+    def t_ns(self) -> NDArray[np.int64]:
+        """(n,), data time"""
+    @property
+    def T_map_body(self) -> NDArray[np.float64]:
+        """(n, 4, 4)"""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(n, 6, 6) of (translation in the map, rotation in the body), m^2, rad^2"""
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(n,): the tracker stands by the pose"""
+    @property
+    def health(self) -> list[str]:
+        """waiting, initialising, tracking, degraded or lost"""
+    @property
+    def summary(self) -> Any:
+        """what summary.json says"""
+    def table(self, file: str = 'states.csv') -> dict[str, NDArray[np.float64]]:
+        """Columns of numbers of states.csv, states_imu.csv, calibration.csv or latency.csv, by name"""
+
+def build_map(
+    cloud: str | PathLike[str],
+    output: str | PathLike[str],
+    settings: dict[str, Any] = {},
+    threads: int = 1,
+) -> Map:
+    """Contours from a point cloud (PLY, PCD, LAS), written as map.h5. settings: keys of evpose map build --set"""
+
+def track(
+    recording: str | PathLike[str],
+    output: str | PathLike[str],
+    map: str | PathLike[str] = '',
+    calibration: str | PathLike[str] = '',
+    occluders: str | PathLike[str] = '',
+    init: str = 'auto',
+    init_sigma: tuple[float, float] = ...,
+    settings: dict[str, Any] = {},
+    replace: bool = False,
+) -> Run:
+    """What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched first"""

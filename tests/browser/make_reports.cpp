@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "evpose/fusion/back_end.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/page.h"
@@ -41,6 +42,11 @@ class Run {
     u.T_map_body = flight(t_s).plus(scaled);
     u.covariance.diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
         Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+    u.velocity =
+        Eigen::Vector3d(1.08 * std::cos(0.9 * t_s), -0.63 * std::sin(0.7 * t_s), 0.2 * std::cos(0.5 * t_s));
+    u.velocity_covariance = 1e-4 * Eigen::Matrix3d::Identity();
+    u.gyro_bias = Eigen::Vector3d(0.01, -0.007, 0.004) * (1 - std::exp(-3 * t_s));
+    u.accel_bias = Eigen::Vector3d(0.03, 0.06, -0.05) * (1 - std::exp(-2 * t_s));
     u.health = health_at(t_s);
     if (u.health != last_) u.reason = "an example <b>reason</b>";
     last_ = u.health;
@@ -60,6 +66,33 @@ class Run {
   Health last_ = Health::waiting;
 };
 
+/// What is found of the calibration settles, its sigmas shrink.
+Calibration found_at(double t_s) {
+  const double share = 1 - std::exp(-t_s), left = std::exp(-0.5 * t_s);
+  Calibration c;
+  c.time_offset_s = 4e-4 * share;
+  c.time_sigma_s = 1e-3 * left;
+  c.turn = so3::exp(Eigen::Vector3d(0.002, -0.001, 0.003) * share);
+  c.turn_sigma_rad.setConstant(0.005 * left);
+  c.shift = Eigen::Vector3d(0.001, 0.002, -0.001) * share;
+  c.shift_sigma_m.setConstant(0.01 * left);
+  c.gravity_sigma_rad.setConstant(0.003 * left);
+  c.intrinsics.setConstant(8, 0.3 * share);
+  c.intrinsics_sigma.setConstant(8, 1 * left);
+  return c;
+}
+
+RunCalibration calibration() {
+  RunCalibration out;
+  out.given.intrinsics =
+      CameraIntrinsics{460, 461, 319.5, 239.5, "radtan", {-0.1, 0.02, 5e-4, -3e-4}, {640, 480}};
+  out.given.T_cam_imu = Pose{so3::exp({0.1, 0, 0}), {0.05, 0, 0}};
+  out.found = out.given;
+  out.found.intrinsics->fx += 0.3;
+  out.found.sigma.time_s = 1e-4;
+  return out;
+}
+
 RgbImage picture(int which) {
   constexpr int kWidth = 320, kHeight = 240;
   std::vector<float> decay(static_cast<std::size_t>(kWidth * kHeight), 0.0f);
@@ -78,13 +111,18 @@ Status make(const std::string& folder) {
   auto made = RunFolder::create(folder + "/run", true);
   if (!made) return made.error();
   Run run;
-  for (int i = 0; i <= 2400; ++i) made->add(run.at(i));
+  for (int i = 0; i <= 2400; ++i) {
+    made->add(run.at(i));
+    made->add_calibration(from_seconds(i / 300.0), found_at(i / 300.0));
+  }
   for (int i = 0; i < 6; ++i)
     made->add_overlay(text("at ", i, ".000 s, 1,100 of 1,500 points matched"), picture(i));
 
   RunSummary summary;
   summary.title = "made-up <room> & </script> flight";
   summary.subtitle = "map: room.ply; start: ground truth";
+  summary.start = "started from ground truth";
+  summary.calibration = calibration();
   for (int i = 0; i <= 8000; ++i) summary.truth.push_back({i * kNsPerMs, flight(1e-3 * i)});
   for (int i = 0; i < 1000; ++i)
     for (const double z : {0.0, 3.0}) {

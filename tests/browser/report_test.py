@@ -16,15 +16,20 @@ import zlib
 
 import chromium
 
-RUN_PLOTS = ["trajectory", "top", "ate", "are", "position-axes", "rotation-axes", "cdf-ate", "cdf-are", "latency",
-             "events", "points"]
+RUN_PLOTS = ["trajectory", "top", "ate", "are", "position-axes", "rotation-axes", "cdf-ate", "cdf-are", "velocity",
+             "attitude", "gyro-bias", "accel-bias", "calibration-time", "calibration-turn", "calibration-shift",
+             "calibration-gravity", "calibration-pinhole", "calibration-distortion", "latency", "events", "points"]
 EVAL_PLOTS = RUN_PLOTS[:8]
+RUN_SECTIONS = ["Trajectory", "What the tracker saw", "Start", "Error against ground truth", "Motion", "Biases of the IMU",
+                "Calibration", "Work and health"]
+EVAL_SECTIONS = ["Trajectory", "Error against ground truth"]
+MOST_BYTES = 2_500_000
 VIEWS = {"wide": {"width": 1440, "height": 900}, "dark": {"width": 1440, "height": 900, "dark": True},
          "phone": {"width": 390, "height": 844, "mobile": True}}
 
 # Number of colours inside the axes of each plot (titles and legends do not count): 1 where nothing is drawn.
 LOOK = """
-(async () => {
+(async (paint) => {
   const colours = async (div) => {
     const image = new Image();
     image.src = await Plotly.toImage(div, { format: "png", width: 400, height: 300 });
@@ -43,28 +48,40 @@ LOOK = """
   };
   const out = { plots: {}, images: [...document.images].map((i) => i.naturalWidth) };
   for (const div of document.querySelectorAll(".plot")) {
-    out.plots[div.id] = { drawn: div.dataset.drawn, colours: await colours(div), height: div.clientHeight };
+    out.plots[div.id] = { drawn: div.dataset.drawn, colours: paint ? await colours(div) : null, height: div.clientHeight };
   }
   const root = document.documentElement;
   out.overflow = root.scrollWidth - root.clientWidth;
+  out.sections = [...document.querySelectorAll("h2")].map((h) => h.textContent);
+  // What is wider than its place must say so, in words that are seen; what is not must not.
+  out.scrolls = [...document.querySelectorAll(".scroll, .strip")].map((box) => ({
+    wide: box.clientWidth > 0 && box.scrollWidth > box.clientWidth + 2,
+    told: box.previousElementSibling.classList.contains("hint") && box.previousElementSibling.clientHeight > 0,
+    shaded: box.classList.contains("more-right"),
+  }));
   out.markup = document.querySelectorAll("room").length;
   return out;
-})()
+})(%s)
 """
 
 
-def look(page, url, plots):
-    """Faults of a page, in words."""
+def look(page, url, plots, sections, paint):
+    """Faults of a page, in words. `paint`: each plot is painted once more to see that it shows something."""
     if not page.wait_for("document.documentElement?.dataset.ready"):
         yield "never ready"
         return
     if (state := page.run("document.documentElement.dataset.ready")) != "ok":
         yield f"{state}: " + str(page.run("document.documentElement.dataset.errors"))
-    seen = page.run(LOOK)
+    seen = page.run(LOOK % str(paint).lower())
     if list(seen["plots"]) != plots:
         yield f"plots {list(seen['plots'])} instead of {plots}"
+    if seen["sections"] != sections:
+        yield f"sections {seen['sections']} instead of {sections}"
+    for number, box in enumerate(seen["scrolls"]):
+        if not box["wide"] == box["told"] == box["shaded"]:
+            yield f"sideways scroll of table or strip {number}: {box}"
     for name, plot in seen["plots"].items():
-        if plot.get("drawn") != "yes" or plot["colours"] < 3 or plot["height"] < 150:
+        if plot.get("drawn") != "yes" or (paint and plot["colours"] < 3) or plot["height"] < 150:
             yield f"plot {name} is empty: {plot}"
     if (requests := page.requests()) != [url]:
         yield f"asked for {requests}"
@@ -102,11 +119,14 @@ def main():
     subprocess.run([make_reports, folder], check=True)
     faults = []
     with chromium.Browser(program) as browser:
-        for name, plots in (("run/report.html", RUN_PLOTS), ("eval.html", EVAL_PLOTS)):
+        for name, plots, sections in (("run/report.html", RUN_PLOTS, RUN_SECTIONS),
+                                      ("eval.html", EVAL_PLOTS, EVAL_SECTIONS)):
+            if (size := (folder / name).stat().st_size) > MOST_BYTES:
+                faults.append(f"{name} has {size} bytes")
             url = (folder / name).as_uri()
             for view, size in VIEWS.items():
                 page = browser.open(url, **size)
-                faults += [f"{name}, {view}: {fault}" for fault in look(page, url, plots)]
+                faults += [f"{name}, {view}: {fault}" for fault in look(page, url, plots, sections, view != "phone")]
                 picture = folder / f"{pathlib.Path(name).stem}-{view}.png"
                 page.screenshot(picture)
                 if busy_share(picture) < 0.01:

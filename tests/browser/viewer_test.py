@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The viewer in headless Chromium: viewer_test.py EVPOSE FOLDER
 
-Connects to a replay, shows a pose that moves, pictures and plots, scrubs, survives a restart of the server, and shows
+Connects to a replay, shows a pose that moves, pictures and plots, scrubs, survives a restart of the server, and plays
 a recorded run; nothing is asked of any other host. Screenshots stay in FOLDER. Without Chromium the test is skipped
 (exit status 77), but not where CI=true.
 """
@@ -13,6 +13,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 
 import chromium
 
@@ -57,6 +58,14 @@ def free_port():
         return s.getsockname()[1]
 
 
+def wait_for_server(port):
+    for _ in range(300):
+        with socket.socket() as s:
+            if s.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.1)
+
+
 class Program:
     def __init__(self, *arguments):
         self.process = subprocess.Popen([EVPOSE, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -87,16 +96,15 @@ def live(browser, recording):
     serve = ["serve", recording, "--map", recording / "contours.ply", "--view", port, "--set", "replay.loop=true",
              "--set", "replay.speed=0.2"]
     with Program(*serve):
-        for _ in range(200):
-            with socket.socket() as s:
-                if s.connect_ex(("127.0.0.1", port)) == 0:
-                    break
+        wait_for_server(port)
         page = browser.open(f"http://127.0.0.1:{port}/", 1440, 900)
         expect(page.wait_for(f"{DATA}.connection === 'connected'", 30), "connects: " + str(page.run(f"{DATA}.connection")))
         expect(page.wait_for(f"Number({DATA}.pictures) > 1 && Number({DATA}.plots) === 6", 30), "pictures and plots come")
         before = page.run(f"{DATA}.pose")
         expect(page.wait_for(f"{DATA}.pose !== '{before}'", 30), "the pose moves")
         expect(page.run(COLOURS % "picture") > 3, "the picture shows events")
+        expect(page.run("(s => s.value === s.max && s.clientWidth > 1200)(document.getElementById('time'))"),
+               "the slider stands at the right end, across the page")
         look(page, "live", port)
         wanted = page.run(SCRUB % 0.5)
         expect(page.wait_for(f"Math.abs({DATA}.t - {wanted}) < 0.1", 10), "scrubs")
@@ -113,22 +121,49 @@ def live(browser, recording):
         phone.close()
 
 
+def plays(page):
+    """From the start to the end at twice the speed; the pictures follow."""
+    slider = "document.getElementById('time')"
+    expect(float(page.run(f"{DATA}.t")) == 0, "starts at the run's start")
+    page.run("document.getElementById('speed').value = 2, document.getElementById('play').click()")
+    expect(page.wait_for(f"Number({DATA}.t) > 0.1", 30), "plays")
+    stopped = "document.getElementById('play').textContent === 'play'"
+    expect(page.wait_for(f"{slider}.value === {slider}.max && {stopped}", 60), "plays to the end and stops")
+    expect(page.wait_for(f"Number({DATA}.pictures) > 2 && Number({DATA}.matched) > 50", 30), "pictures of the run")
+    expect(page.run(COLOURS % "picture") > 3, "the picture shows events")
+
+
 def recorded(browser, recording):
     subprocess.run([EVPOSE, "-q", "track", recording, "--map", recording / "contours.ply", "-o", FOLDER / "run", "--force"],
                    check=True, capture_output=True, timeout=60)
     port = free_port()
-    with Program("view", FOLDER / "run", "--map", recording / "contours.ply", "--port", port):
-        for _ in range(200):
-            with socket.socket() as s:
-                if s.connect_ex(("127.0.0.1", port)) == 0:
-                    break
+    with Program("view", FOLDER / "run", "--port", port):
+        wait_for_server(port)
         page = browser.open(f"http://127.0.0.1:{port}/", 1440, 900)
         expect(page.wait_for(f"{DATA}.connection === 'recorded' && Number({DATA}.plots) === 6", 60), "loads the run")
+        plays(page)
         end = page.run(f"{DATA}.pose")
-        wanted = page.run(SCRUB % 0.25)
+        wanted = page.run(SCRUB % 0.75)
         expect(abs(float(page.run(f"{DATA}.t")) - wanted) < 0.01, "scrubs the run")
         expect(page.run(f"{DATA}.pose") != end, "to another pose")
         look(page, "run", port)
+        page.close()
+        phone = browser.open(f"http://127.0.0.1:{port}/", 390, 844, mobile=True)
+        expect(phone.wait_for(f"Number({DATA}.pictures) > 0 && Number({DATA}.plots) === 6", 60), "a run on a phone")
+        look(phone, "run-phone", port)
+        expect(phone.run("document.getElementById('time').clientWidth") > 340, "the slider spans the phone")
+        phone.close()
+
+
+def without_pictures(browser):
+    """The recording has gone: all but the pictures is there, and why."""
+    shutil.move(FOLDER / "recording/events.h5", FOLDER / "events.h5")
+    port = free_port()
+    with Program("view", FOLDER / "run", "--port", port):
+        wait_for_server(port)
+        page = browser.open(f"http://127.0.0.1:{port}/", 1440, 900)
+        expect(page.wait_for(f"({DATA}.connection ?? '').startsWith('recorded; no pictures: ')", 60), "says why")
+        expect(page.run("document.getElementById('picture-card').clientHeight") == 0, "no empty card")
         page.close()
 
 
@@ -143,7 +178,8 @@ def main():
     with chromium.Browser(program) as browser:
         live(browser, recording)
         recorded(browser, recording)
-    print("follows, scrubs, survives a restart")
+        without_pictures(browser)
+    print("follows, plays, scrubs, survives a restart")
     return 0
 
 

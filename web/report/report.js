@@ -51,9 +51,25 @@ function card(row, id, title, about, figure, shape = "") {
 function table(parent, header, rows, numbers = []) {
   const cells = (tag, row) => row.map((text, i) => element(tag, { text, cls: numbers.includes(i) ? "number" : "" }));
   const scroll = element("div", { cls: "scroll", parent });
-  const body = element("table", { parent: scroll });
+  const body = element("table", { cls: numbers.length ? "figures" : "", parent: scroll });
   if (header.length) element("tr", { parent: body }, cells("th", header));
   for (const row of rows) element("tr", { parent: body }, cells("td", row));
+  hintAtScroll(scroll);
+}
+
+/** What is wider than its place says so: a shadow at the side where more is, and words above. */
+function hintAtScroll(box) {
+  const hint = element("p", { cls: "hint", text: "wider than the page: scroll sideways \u2192" });
+  box.before(hint);
+  const look = () => {
+    const rest = box.scrollWidth - box.clientWidth;
+    box.classList.toggle("more-right", box.scrollLeft < rest - 2);
+    box.classList.toggle("more-left", box.scrollLeft > 2);
+    hint.hidden = rest <= 2;
+  };
+  box.addEventListener("scroll", look, { passive: true });
+  new ResizeObserver(look).observe(box);
+  look();
 }
 
 // ---- look ----
@@ -271,6 +287,7 @@ function overlays(page) {
       element("figcaption", { text: o.caption }),
     ]);
   }
+  hintAtScroll(strip);
 }
 
 function errors(page) {
@@ -322,10 +339,22 @@ function build() {
     card(row, "top", "From above", "", topView, "tall");
   }
   overlays(page);
+  start(page);
   errors(page);
+  motion(page);
+  biases(page);
+  calibration(page);
   work(page);
   details(page);
   document.getElementById("foot").textContent = run.foot;
+}
+
+/** Unpacks and runs the plot library, which stands in the page as a third of its size. */
+async function loadPlotly() {
+  if (!window.DecompressionStream) throw new Error("the browser is older than 2023 and cannot unpack the plot library");
+  const packed = Uint8Array.from(atob(document.getElementById("plotly").textContent), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  element("script", { text: await new Response(stream).text(), parent: document.head });
 }
 
 async function draw() {
@@ -339,7 +368,7 @@ async function draw() {
 }
 
 build();
-draw().then(() => {
+loadPlotly().then(draw).then(() => {
   root.dataset.plots = plots.length;
   if (!faults.length) root.dataset.ready = "ok";
 });

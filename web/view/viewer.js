@@ -3,6 +3,8 @@
 // run. Text goes in as text, never as markup. Nothing is loaded from outside of this server.
 import * as THREE from "./three.js";
 import { OrbitControls } from "./orbit.js";
+import { RecordedPictures, showPicture } from "./picture.js";
+import { drawPlots, moveMark, onPick } from "./plots.js";
 
 const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
@@ -58,7 +60,11 @@ const pathColours = new Float32Array(3 * MOST_ROWS);
 path.geometry.setAttribute("position", new THREE.BufferAttribute(pathPositions, 3));
 path.geometry.setAttribute("color", new THREE.BufferAttribute(pathColours, 3));
 path.geometry.setDrawRange(0, 0);
-scene.add(body, ellipsoid, path);
+const wholePath = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.35 }));
+wholePath.frustumCulled = false;
+for (const name of ["position", "color"]) wholePath.geometry.setAttribute(name, path.geometry.attributes[name]);
+wholePath.geometry.setDrawRange(0, 0);
+scene.add(body, ellipsoid, path, wholePath);
 let mapParts = [];
 
 function showMap(map) {
@@ -79,7 +85,7 @@ function frameAll(map) {
   if (box.isEmpty()) return;
   const size = Math.max(1, box.getSize(new THREE.Vector3()).length());
   box.getCenter(controls.target);
-  camera.position.copy(controls.target).add(new THREE.Vector3(-0.45, -0.6, 0.5).multiplyScalar(size));
+  camera.position.copy(controls.target).add(new THREE.Vector3(-0.45, -0.6, 0.5).multiplyScalar(size * Math.max(1.05, 0.9 / camera.aspect)));
   controls.update();
 }
 
@@ -136,6 +142,7 @@ function extendPath(from) {
   }
   path.geometry.attributes.position.needsUpdate = true;
   path.geometry.attributes.color.needsUpdate = true;
+  wholePath.geometry.setDrawRange(0, rows.length);
 }
 
 let drawing = false;
@@ -158,53 +165,9 @@ function resize() {
 }
 new ResizeObserver(resize).observe($("scene").parentElement);
 
-// ---- the picture ----
-
-// Green where an event has just been at the projected point, through yellow to violet where none was: colours that
-// events do not have.
-const RESIDUAL = Array.from({ length: 32 }, (_, i) => {
-  const [from, to] = i < 16 ? [[61, 220, 132], [255, 225, 77]] : [[255, 225, 77], [224, 92, 255]], share = (i % 16) / 15;
-  return `rgb(${from.map((v, k) => Math.round(v + share * (to[k] - v))).join(" ")})`;
-});
-
-function showPicture(buffer) {
-  const head = new DataView(buffer);
-  const width = head.getUint32(0, true), height = head.getUint32(4, true), points = head.getUint32(8, true);
-  const canvas = $("picture");
-  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-  const shades = new Uint8Array(buffer, 16, width * height);
-  const context = canvas.getContext("2d");
-  const image = context.createImageData(width, height);
-  for (let i = 0; i < shades.length; ++i) {
-    const value = shades[i] - 128, share = Math.abs(value) / 127;
-    image.data[4 * i] = value > 0 ? 40 + 215 * share : 20 + 71 * share;
-    image.data[4 * i + 1] = 20 + 90 * share;
-    image.data[4 * i + 2] = value < 0 ? 40 + 215 * share : 20 + 74 * share;
-    image.data[4 * i + 3] = 255;
-  }
-  context.putImageData(image, 0, 0);
-  const begin = Math.ceil((16 + width * height) / 4) * 4;
-  const list = new Float32Array(buffer, begin, 3 * points);
-  for (let i = 0; i < points; ++i) {
-    context.fillStyle = RESIDUAL[Math.min(RESIDUAL.length - 1, Math.max(0, Math.floor(list[3 * i + 2] * RESIDUAL.length)))];
-    context.fillRect(Math.round(list[3 * i]), Math.round(list[3 * i + 1]), 1, 1);
-  }
-  root.dataset.pictures = 1 + Number(root.dataset.pictures ?? 0);
-}
-
 // ---- plots ----
 
-const PLOTS = [
-  ["plot-rate", "events, million a second", [["rate_mev_s", "", 1]]],
-  ["plot-latency", "delay, ms", [["latency_ms", "", 1]]],
-  ["plot-sigma", "sigma: mm, hundredths of a degree", [["cxx", "x", (v) => 1000 * Math.sqrt(v)], ["cyy", "y", (v) => 1000 * Math.sqrt(v)], ["czz", "z", (v) => 1000 * Math.sqrt(v)], ["rotation_deg", "rotation", 100]]],
-  ["plot-gyro", "gyroscope's bias, mrad/s", [["bgx", "x", 1000], ["bgy", "y", 1000], ["bgz", "z", 1000]]],
-  ["plot-accel", "accelerometer's bias, mm/s²", [["bax", "x", 1000], ["bay", "y", 1000], ["baz", "z", 1000]]],
-  ["plot-points", "map points: chosen, matched", [["points", "chosen", 1], ["matched", "matched", 1]]],
-];
-const INK = ["#4cc2ff", "#ffb020", "#3ddc84", "#ff7ab6"];
-
-function window_() {
+function rowsToPlot() {
   if (rows.length === 0) return [];
   if (mode === "run" || !following) return rows;
   const from = at(rows[rows.length - 1], "t") - SPAN_S;
@@ -213,46 +176,33 @@ function window_() {
   return rows.slice(i);
 }
 
-function drawPlots() {
-  let part = window_();
-  const step = Math.ceil(part.length / 1200);
-  if (step > 1) part = part.filter((_, i) => i % step === 0);
-  const t = part.map((row) => at(row, "t"));
-  const now = shown >= 0 ? at(rows[shown], "t") : 0;
-  for (const [id, title, lines] of PLOTS) {
-    const data = lines.map(([name, label, scale], i) => ({
-      x: t, y: part.map((row) => (at(row, name) === null ? null : typeof scale === "function" ? scale(at(row, name)) : scale * at(row, name))),
-      name: label, mode: "lines", line: { width: 1.2, color: INK[i] }, hoverinfo: "x+y",
-    }));
-    Plotly.react(id, data, {
-      title: { text: title, font: { size: 12, color: "#dbe3ec" }, x: 0.02, y: 0.97 },
-      margin: { l: 42, r: 8, t: 24, b: 22 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { size: 10, color: "#8d9aa8" }, showlegend: lines.length > 1,
-      legend: { orientation: "h", x: 1, xanchor: "right", y: 1.16, bgcolor: "rgba(0,0,0,0)" },
-      xaxis: { gridcolor: "#2c3540", zeroline: false, fixedrange: true }, yaxis: { gridcolor: "#2c3540", zeroline: false, fixedrange: true, rangemode: "tozero" },
-      shapes: following && mode === "live" ? [] : [{ type: "line", x0: now, x1: now, yref: "paper", y0: 0, y1: 1, line: { color: "#dbe3ec", width: 1 } }],
-    }, { displayModeBar: false, responsive: true });
-  }
-  root.dataset.plots = PLOTS.length;
-}
+const markTime = () => (shown < 0 || (following && mode === "live") ? null : at(rows[shown], "t"));
 let plotsWait = 0;
+let plotted = -1; // rows of a recorded run, which do not change
 function plotsSoon() {
   if (plotsWait) return;
   plotsWait = setTimeout(() => {
     plotsWait = 0;
-    drawPlots();
-  }, 500);
+    if (mode === "run" && plotted === rows.length) return moveMark(markTime());
+    drawPlots(rowsToPlot(), at, markTime());
+    if (plotted < 0) onPick(pick);
+    plotted = rows.length;
+  }, mode === "run" && plotted >= 0 ? 100 : 500);
 }
 
 // ---- time ----
+
+const pictures = new RecordedPictures();
 
 function show(index) {
   if (rows.length === 0) return;
   shown = Math.max(0, Math.min(rows.length - 1, index));
   showPose(rows[shown]);
   path.geometry.setDrawRange(0, shown + 1);
+  $("time").min = at(rows[0], "t");
   $("time").max = at(rows[rows.length - 1], "t");
-  if (following) $("time").value = at(rows[shown], "t");
+  $("time").value = at(rows[shown], "t");
+  if (mode === "run") pictures.show(at(rows[shown], "t"));
   draw();
   plotsSoon();
 }
@@ -272,14 +222,44 @@ function setFollowing(on) {
   $("live").ariaPressed = String(on);
   if (on) show(rows.length - 1);
 }
-$("time").addEventListener("input", () => {
+
+function pick(t) {
+  play(false);
   setFollowing(false);
-  show(indexAt(Number($("time").value)));
-});
+  show(indexAt(t));
+}
+$("time").addEventListener("input", () => pick(Number($("time").value)));
 $("live").addEventListener("click", () => setFollowing(true));
 $("follow").addEventListener("click", () => {
   $("follow").ariaPressed = String($("follow").ariaPressed !== "true");
   show(shown);
+});
+
+/** Of a recorded run, in the time of the wall times the speed; from the start again if it is at the end. */
+let playing = false;
+function play(on) {
+  playing = on;
+  $("play").textContent = on ? "pause" : "play";
+  $("play").ariaPressed = String(on);
+  if (!on) return;
+  const end = at(rows[rows.length - 1], "t");
+  let t = shown >= rows.length - 1 ? at(rows[0], "t") : at(rows[shown], "t");
+  let before = performance.now();
+  const step = (now) => {
+    if (!playing) return;
+    t += (Number($("speed").value) * Math.max(0, now - before)) / 1000;
+    before = now;
+    show(indexAt(Math.min(t, end)));
+    if (t >= end) return play(false);
+    requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+}
+$("play").addEventListener("click", () => play(!playing));
+document.addEventListener("keydown", (e) => {
+  if (e.key !== " " || mode !== "run" || ["BUTTON", "SELECT"].includes(e.target.tagName)) return;
+  e.preventDefault();
+  play(!playing);
 });
 
 function addRows(more) {
@@ -324,7 +304,7 @@ async function load() {
   addRows(history.rows);
   $("follow").ariaPressed = String(mode === "live");
   frameAll(map);
-  show(rows.length - 1);
+  show(mode === "live" ? rows.length - 1 : 0);
   root.dataset.loaded = 1 + Number(root.dataset.loaded ?? 0);
 }
 
@@ -347,7 +327,7 @@ function connect() {
     } else if (message.kind === "restart") {
       rows = [];
       shown = -1;
-      path.geometry.setDrawRange(0, 0);
+      for (const line of [path, wholePath]) line.geometry.setDrawRange(0, 0);
     } else if (message.kind === "notice") notice(message.words);
   };
   socket.onopen = async () => {
@@ -376,6 +356,10 @@ async function start() {
     if (kind === "run") {
       await load();
       say("recorded");
+      pictures.follow((fault) => {
+        document.body.classList.add("unpictured");
+        say(`recorded; no pictures: ${fault}`);
+      });
     } else connect();
   } catch {
     say("not connected, trying again");

@@ -8,4 +8,5 @@
 EVPOSE_ASSET(report_html)
 EVPOSE_ASSET(report_css)
 EVPOSE_ASSET(report_js)
-EVPOSE_ASSET(plotly_js)
+EVPOSE_ASSET(motion_js)
+EVPOSE_ASSET(plotly_gz)

@@ -9,6 +9,7 @@ namespace evpose::assets {
 std::string_view report_html();
 std::string_view report_css();
 std::string_view report_js();
-std::string_view plotly_js();
+std::string_view motion_js();
+std::string_view plotly_gz();  ///< packed by web/pack.js
 
 }  // namespace evpose::assets

@@ -108,7 +108,9 @@ Expected<std::size_t> render_film(const FilmRequest& request) {
   if (rows.empty())
     return Error{"--start", text(request.start_s, " s lies after the end of the run"),
                  text("the run has ", to_seconds(run->rows.back().t - run->rows.front().t), " s")};
-  auto pictures = RunPictures::open(*run);
+  auto map = read_run_map(*run);
+  if (!map) return map.error();
+  auto pictures = RunPictures::open(*run, *std::move(map));
   if (!pictures) return pictures.error();
   FilmFrames frames(*run, pictures->map(), pictures->size());
   auto output = open_output(request, frames);

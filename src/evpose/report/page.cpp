@@ -3,6 +3,7 @@
 
 #include "evpose/core/error.h"
 #include "evpose/report/assets.h"
+#include "evpose/report/series.h"
 
 namespace evpose {
 namespace {
@@ -53,18 +54,20 @@ std::string_view checked_script(std::string_view script) {
 
 std::string page_html(const std::string& title, const std::string& data_json) {
   const std::string safe_title = escaped_html(title), safe_data = escaped_json(data_json);
+  const std::string plotly = base64(assets::plotly_gz());
   const auto part = [&](std::string_view name) -> std::string_view {
     if (name == "TITLE") return safe_title;
     if (name == "STYLE") return assets::report_css();
     if (name == "DATA") return safe_data;
-    if (name == "PLOTLY") return checked_script(assets::plotly_js());
+    if (name == "PLOTLY") return plotly;
+    if (name == "MOTION") return checked_script(assets::motion_js());
     EVPOSE_CHECK(name == "SCRIPT");
     return checked_script(assets::report_js());
   };
   // One pass over the shell: what is put in is not searched again.
   std::string_view shell = assets::report_html();
   std::string out;
-  out.reserve(assets::plotly_js().size() + safe_data.size() + (1u << 16));
+  out.reserve(plotly.size() + safe_data.size() + (1u << 16));
   for (std::size_t at = shell.find('@'); at != std::string_view::npos; at = shell.find('@')) {
     const std::size_t end = shell.find('@', at + 1);
     EVPOSE_CHECK(end != std::string_view::npos);

@@ -2,22 +2,22 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "evpose/core/version.h"
 #include "evpose/eval/statistics.h"
 #include "evpose/report/page.h"
-#include "evpose/report/series.h"
+#include "evpose/report/page_parts.h"
 #include "evpose/report/summary.h"
 
 namespace evpose {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = PageJson;
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
-constexpr std::size_t kSeriesPoints = 2000, kPathPoints = 3000, kMapPoints = 6000, kMarks = 300;
+constexpr std::size_t kPathPoints = 1500, kMapPoints = 4000, kMarks = 300;
+constexpr std::size_t kPictureBytes = 700'000;  // of all pictures: the file shall stay below 2.5 MB
 
 std::string format(const char* pattern, auto... values) {
   char out[200];
@@ -37,11 +37,6 @@ Json numbers(const std::vector<double>& values, int digits) {
   return out;
 }
 
-Json series_json(const Series& series) {
-  const Series few = thin(series, kSeriesPoints);
-  return {{"t", numbers(few.t, 9)}, {"y", numbers(few.y, 5)}};
-}
-
 /// Positions as columns; `position(i)` in metres.
 template <class Position>
 Json columns(const std::vector<std::size_t>& indices, int digits, Position&& position) {
@@ -58,11 +53,11 @@ Json columns(const std::vector<std::size_t>& indices, int digits, Position&& pos
 Json path_json(const std::string& name, const std::string& role, std::span<const TimedPose> path,
                TimeNs origin) {
   const std::vector<std::size_t> indices = evenly_spaced_indices(path.size(), kPathPoints);
-  Json out = columns(indices, 8, [&](std::size_t i) { return path[i].pose.p; });
+  Json out = columns(indices, 7, [&](std::size_t i) { return path[i].pose.p; });
   out["name"] = name;
   out["role"] = role;
   out["t"] = Json::array();
-  for (const std::size_t i : indices) out["t"].push_back(rounded(to_seconds(path[i].t - origin), 9));
+  for (const std::size_t i : indices) out["t"].push_back(rounded(to_seconds(path[i].t - origin), 7));
   return out;
 }
 
@@ -294,12 +289,34 @@ Json details_json(const RunSummary& summary, const ConfigTable& config) {
   return {{{"title", "Settings"}, {"rows", settings}}, {{"title", "Versions"}, {"rows", versions}}};
 }
 
+/// As many as there is room for, evenly over the run.
+Json overlays_json(std::span<const OverlayPicture> overlays) {
+  for (std::size_t count = overlays.size(); count > 0; --count) {
+    Json out = Json::array();
+    std::size_t bytes = 0;
+    for (const std::size_t i : evenly_spaced_indices(overlays.size(), count)) {
+      const OverlayPicture& o = overlays[i];
+      std::string png = base64(o.png);
+      bytes += png.size();
+      out.push_back(
+          {{"caption", o.caption}, {"png", std::move(png)}, {"width", o.width}, {"height", o.height}});
+    }
+    if (bytes <= kPictureBytes) return out;
+  }
+  return Json::array();
+}
+
 std::string page(const Json& data) {
   return page_html(data["title"].get<std::string>(),
                    data.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 }  // namespace
+
+Json series_json(const Series& series, std::size_t points) {
+  const Series few = thin(series, points);
+  return {{"t", numbers(few.t, 7)}, {"y", numbers(few.y, 5)}};
+}
 
 std::string run_page(const RunPage& run) {
   const StateLog& log = run.log;
@@ -325,10 +342,11 @@ std::string run_page(const RunPage& run) {
     data["health"] = health_json(log, origin);
     if (const auto latency = summarise_latency(log)) data["latency"] = latency_json(log, *latency);
   }
-  data["overlays"] = Json::array();
-  for (const OverlayPicture& o : run.overlays)
-    data["overlays"].push_back(
-        {{"caption", o.caption}, {"png", base64(o.png)}, {"width", o.width}, {"height", o.height}});
+  data["start"] = start_json(log, run.summary);
+  data["motion"] = motion_json(log, truth, origin);
+  data["biases"] = biases_json(log, origin);
+  data["calibration"] = calibration_page_json(log, run.summary, origin);
+  data["overlays"] = overlays_json(run.overlays);
   data["details"] = details_json(run.summary, run.config);
   return page(data);
 }

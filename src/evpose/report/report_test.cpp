@@ -8,12 +8,15 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <random>
 #include <set>
+#include <sstream>
 
 #include "evpose/io/files/png_file.h"
 #include "evpose/report/map_accuracy.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/page.h"
+#include "evpose/report/page_parts.h"
 #include "evpose/report/run_folder.h"
 #include "evpose/report/series.h"
 #include "evpose/report/state_log.h"
@@ -268,11 +271,11 @@ TEST(Page, NothingInTheDataCanEndItsElement) {
   const Folder folder;
   ASSERT_TRUE(write_run(folder.file("run")));
   const std::string page = content(folder.file("run/report.html"));
-  // The shell has three scripts; whatever the title says, there are no more.
+  // The shell has four scripts; whatever the title says, there are no more.
   std::size_t ends = 0;
   for (std::size_t at = page.find("</script"); at != std::string::npos; at = page.find("</script", at + 1))
     ++ends;
-  EXPECT_EQ(ends, 3u);
+  EXPECT_EQ(ends, 4u);
   EXPECT_EQ(page.find("<b>circle"), std::string::npos);
   EXPECT_NE(page.find("&lt;b&gt;circle"), std::string::npos);
 
@@ -282,6 +285,115 @@ TEST(Page, NothingInTheDataCanEndItsElement) {
   EXPECT_EQ(data["title"], a_summary().title);
   EXPECT_EQ(data["paths"].size(), 2u);
   EXPECT_EQ(data["map"]["x"].size(), 2u);  // the far point is left out
+}
+
+/// Noise that neither thins out nor packs.
+Expected<RunOutcome> write_noisy_run(const std::string& path) {
+  auto folder = RunFolder::create(path, false);
+  if (!folder) return folder.error();
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  RunSummary summary = a_summary();
+  summary.truth.clear();
+  for (int i = 0; i < 6000; ++i) {
+    Update u = update_at(i + 100, 1e-4);
+    for (int k = 0; k < 3; ++k) {
+      u.velocity[k] = normal(random);
+      u.gyro_bias[k] = u.accel_bias[k] = 0.01 * normal(random);
+      u.velocity_covariance(k, k) = 0.01 * std::abs(normal(random));
+      u.T_map_body.p[k] += 0.01 * normal(random);
+    }
+    summary.truth.push_back({u.t, circle(0.01 * i + 1)});
+    summary.map_points.push_back(u.T_map_body.p);
+    folder->add(u);
+    Calibration c;
+    c.intrinsics = Eigen::VectorXd::NullaryExpr(8, [&] { return normal(random); });
+    c.intrinsics_sigma = Eigen::VectorXd::Constant(8, 1 + 0.1 * normal(random));
+    c.turn_sigma_rad.setConstant(0.01 * std::abs(normal(random)) + 1e-3);
+    folder->add_calibration(u.t, c);
+  }
+  for (int i = 0; i < 8; ++i) {
+    RgbImage image(640, 480);
+    for (std::uint8_t& byte : image.rgb) byte = random() % 4 == 0 ? 0 : 255;
+    folder->add_overlay("noise", image);
+  }
+  ConfigTable none;
+  return folder->finish(summary, none);
+}
+
+TEST(Page, OfALongNoisyRunStaysBelowTwoAndAHalfMegabytesWithAllSections) {
+  const Folder folder;
+  ASSERT_TRUE(write_noisy_run(folder.file("run")));
+  const std::string page = content(folder.file("run/report.html"));
+  EXPECT_LT(page.size(), 2'500'000u);
+  const std::string open = R"(id="run">)";
+  const std::size_t begin = page.find(open) + open.size();
+  const Json data = Json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+  for (const char* part : {"paths", "errors", "motion", "biases", "start", "activity", "health", "overlays"})
+    EXPECT_FALSE(data[part].empty()) << part;
+  EXPECT_LT(data["overlays"].size(), 8u);
+  // The peaks are there, though few of the values are.
+  double peak = 0;
+  std::ifstream states(folder.file("run/states.csv"));
+  std::string row;
+  std::getline(states, row);
+  while (std::getline(states, row)) {
+    std::stringstream fields(row);
+    for (int k = 0; k < 9; ++k) std::getline(fields, row, ',');
+    peak = std::max(peak, std::stod(row));
+  }
+  const auto shown = data["motion"]["velocity"][0]["series"]["y"].get<std::vector<double>>();
+  EXPECT_LE(shown.size(), 1000u);
+  EXPECT_NEAR(*std::max_element(shown.begin(), shown.end()), peak, 1e-4);
+}
+
+TEST(Page, TellsWhatWasGivenAndFoundOfTheCalibration) {
+  StateLog log;
+  for (int i = 0; i < 20; ++i) log.add(update_at(i, 0));
+  Calibration c;
+  c.time_offset_s = 0.002;
+  c.time_sigma_s = 0.001;
+  log.calibration = {calibration_row(0, c), calibration_row(kNsPerS, c)};
+  RunSummary summary = a_summary();
+  summary.start = "started from ground truth";
+  RunCalibration known;
+  known.given.intrinsics = CameraIntrinsics{400, 400, 320, 240, "none", {}, {640, 480}};
+  known.given.sigma.intrinsics = std::vector<double>{2, 2, 1, 1};
+  known.found = known.given;
+  known.found.intrinsics->fx = 401;
+  summary.calibration = known;
+  const PageJson page = calibration_page_json(log, summary, 0);
+  EXPECT_EQ(page["table"][0], Json({"Focal length x, px", "400", "2", "401", "2", "+0.50"}));
+  ASSERT_EQ(page["plots"].size(), 1u) << "the time offset alone is a state";
+  EXPECT_EQ(page["plots"][0]["id"], "calibration-time");
+  EXPECT_NEAR(page["plots"][0]["lines"][0]["high"]["y"][0], 3, 1e-9);
+  EXPECT_EQ(start_json(log, summary)[0], Json({"Start", "started from ground truth"}));
+  EXPECT_TRUE(biases_json(log, 0).is_null());
+  // A heading that passes half a turn has no jump.
+  const auto yaw = motion_json(log, {}, 0)["attitude"][2]["series"]["y"].get<std::vector<double>>();
+  EXPECT_NEAR(yaw.back() - yaw.front(), 0.19 * 180 / M_PI, 1e-2);
+}
+
+TEST(RunFolder, TellsTheCourseOfTheCalibrationTwentyTimesASecond) {
+  const Folder folder;
+  auto run = RunFolder::create(folder.file("run"), false);
+  ASSERT_TRUE(run);
+  for (int i = 0; i < 100; ++i) {
+    run->add(update_at(i, 0));
+    Calibration c;
+    if (i >= 10) c.shift_sigma_m.setConstant(0.01);
+    run->add_calibration(i * 10 * kNsPerMs, c);
+  }
+  ConfigTable none;
+  ASSERT_TRUE(run->finish(a_summary(), none));
+  std::ifstream file(folder.file("run/calibration.csv"));
+  std::string header, row, last;
+  std::getline(file, header);
+  EXPECT_EQ(header.rfind("t_s,time_offset_s,turn_x_rad,", 0), 0u);
+  std::size_t rows = 0;
+  while (std::getline(file, row)) last = row, ++rows;
+  EXPECT_EQ(rows, 18u) << "from 0.1 s, when it became a state";
+  EXPECT_EQ(std::count(header.begin(), header.end(), ','), std::count(last.begin(), last.end(), ','));
 }
 
 TEST(Page, KeepsAtSignsOfTheData) {

@@ -20,9 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kFiles{"trajectory.tum", "trajectory_camera.tum", "states.csv",
-                            "states_imu.csv", "latency.csv",           "summary.json",
-                            "config.yaml",    "report.html",           "calibration.yaml"};
+constexpr std::array kFiles{"trajectory.tum",   "trajectory_camera.tum", "states.csv",  "states_imu.csv",
+                            "latency.csv",      "summary.json",          "config.yaml", "report.html",
+                            "calibration.yaml", "calibration.csv"};
+constexpr TimeNs kCalibrationApart = 50 * kNsPerMs;  // rows of calibration.csv
 
 /// Nothing, an empty folder, or if asked for an earlier run may be replaced.
 Status check_place(const fs::path& place, bool replace) {
@@ -71,7 +72,7 @@ std::optional<TrajectoryScore> score_run(const StateLog& log, const std::vector<
 
 struct RunFolder::State {
   fs::path place, folder;  ///< where it will stand; where it is made
-  std::optional<AtomicFile> states, latency, states_imu;
+  std::optional<AtomicFile> states, latency, states_imu, calibration;
   StateLog log;
   std::vector<OverlayPicture> overlays;
   bool replace = false;  ///< what stands there
@@ -83,14 +84,24 @@ struct RunFolder::State {
     fs::remove_all(folder, ignored);
   }
   std::string file(const char* name) const { return (folder / name).string(); }
+  /// Begins a table with its first row. If it cannot be made, neither can the other files: they tell.
+  void begin(std::optional<AtomicFile>& table, const char* name, const std::string& header);
   /// The user knows the folder by the place where it will stand.
   Status commit_tables();
   Status write_trajectories(const Pose& T_body_cam) const;
   Status move_into_place();
 };
 
+void RunFolder::State::begin(std::optional<AtomicFile>& table, const char* name, const std::string& header) {
+  if (table) return;
+  auto opened = AtomicFile::create(file(name));
+  if (!opened) return;
+  table.emplace(std::move(opened).value());
+  table->write(header);
+}
+
 Status RunFolder::State::commit_tables() {
-  for (auto* table : {&states, &latency, &states_imu}) {
+  for (auto* table : {&states, &latency, &states_imu, &calibration}) {
     if (!*table) continue;
     if (Status done = (*table)->commit(); !done)
       return Error{place.string(), done.error().what, done.error().fix};
@@ -172,13 +183,19 @@ void RunFolder::add(const Update& update) {
 
 void RunFolder::add_state(const FusionState& state) {
   EVPOSE_CHECK(state_ && !state_->finished);
-  if (!state_->states_imu) {
-    auto opened = AtomicFile::create(state_->file("states_imu.csv"));
-    if (!opened) return;  // the same folder as the other files': they tell
-    state_->states_imu.emplace(std::move(opened).value());
-    state_->states_imu->write(imu_states_csv_header());
-  }
-  state_->states_imu->write(imu_states_csv_row(state));
+  state_->begin(state_->states_imu, "states_imu.csv", imu_states_csv_header());
+  if (state_->states_imu) state_->states_imu->write(imu_states_csv_row(state));
+}
+
+void RunFolder::add_calibration(TimeNs t, const Calibration& calibration) {
+  EVPOSE_CHECK(state_ && !state_->finished);
+  auto& rows = state_->log.calibration;
+  if (!rows.empty() && t < rows.back().t + kCalibrationApart) return;
+  const CalibrationRow row = calibration_row(t, calibration);
+  if (!is_estimated(row)) return;
+  state_->begin(state_->calibration, "calibration.csv", calibration_csv_header(row));
+  if (state_->calibration) state_->calibration->write(calibration_csv_row(row));
+  rows.push_back(row);
 }
 
 void RunFolder::add_overlay(const std::string& caption, const RgbImage& image) {

@@ -19,6 +19,7 @@
 
 namespace evpose {
 
+struct Calibration;
 struct FusionState;
 
 /// A calibration that the tracker has estimated: as it was given, and as it was known at the end. Both state
@@ -61,7 +62,8 @@ struct RunOutcome {
 };
 
 /// The output of a run: trajectory.tum, trajectory_camera.tum, states.csv, if wanted states_imu.csv,
-/// latency.csv, summary.json, config.yaml, report.html and, if it was estimated, calibration.yaml. It is made
+/// latency.csv, summary.json, config.yaml, report.html and, if it was estimated, calibration.yaml and
+/// calibration.csv. It is made
 /// under a temporary name beside its place and moved there when all is written, so that nothing is changed by
 /// a run that fails. The same estimates give the same bytes, but for what depends on wall time: latency.csv,
 /// report.html, and "latency", "resources" and "rate_mev_s" in summary.json.
@@ -80,6 +82,9 @@ class RunFolder {
   void add(const Update& update);
   /// A state at an IMU sample, in order of time, for states_imu.csv; the file is made with the first.
   void add_state(const FusionState& state);
+  /// What is known of the calibration after an update, in order of time, for calibration.csv: about twenty
+  /// times a second, if any of it is estimated.
+  void add_calibration(TimeNs t, const Calibration& calibration);
   /// A picture for the report.
   void add_overlay(const std::string& caption, const RgbImage& image);
 

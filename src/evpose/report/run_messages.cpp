@@ -173,14 +173,15 @@ Expected<RunMessages> write_run_mcap(const std::string& path, const RunFiles& ru
   if (auto status = check_times(run); !status) return status.error();
   RunMessages counts;
   std::optional<RunPictures> pictures;
-  if (auto opened = RunPictures::open(run))
+  const auto map = read_run_map(run);
+  if (auto opened = map ? RunPictures::open(run, *map) : map.error())
     pictures.emplace(*std::move(opened));
   else
     counts.without = opened.error().line();
   auto file = create_mcap(path, Compression::none);  // pictures, most of it, are packed already
   if (!file) return file.error();
   RunWriter writer(*std::move(file));
-  if (const auto map = read_run_map(run)) writer.put_map(run.rows.front().t, *map, &counts);
+  if (map) writer.put_map(run.rows.front().t, *map, &counts);
   writer.put_path(run.rows);
   if (auto status = put_updates(writer, run, pictures, &counts); !status) return status.error();
   if (auto status = writer.finish(); !status) return status.error();

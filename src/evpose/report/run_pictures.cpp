@@ -9,7 +9,6 @@
 #include "evpose/io/recording/recording.h"
 #include "evpose/map/contour_index.h"
 #include "evpose/map/visible_set.h"
-#include "evpose/tracker/snapshot.h"
 
 namespace evpose {
 namespace {
@@ -94,34 +93,38 @@ Expected<ContourMap> read_run_map(const RunFiles& run) {
   return map;
 }
 
-Expected<RunPictures> RunPictures::open(const RunFiles& run) {
+Expected<RunPictures> RunPictures::open(const RunFiles& run, ContourMap map) {
   if (run.input.recording.empty())
     return Error{run.folder, "does not say what it was made from", "give a run of evpose track"};
   const auto recording = open_recording(run.input.recording, run.calibration);
   if (!recording) return recording.error();
-  auto map = read_run_map(run);
-  if (!map) return map.error();
   auto camera = make_camera(recording->camera);
   if (!camera) return camera.error();
-  auto state = std::make_unique<State>(*recording, std::move(*map), std::move(*camera));
+  auto state = std::make_unique<State>(*recording, std::move(map), std::move(*camera));
   auto events = open_events(state->recording, kPacket_s);
   if (!events) return events.error();
   state->events = std::move(*events);
   return RunPictures(std::move(state));
 }
 
-Expected<RgbImage> RunPictures::draw(const RunRow& row) {
+Expected<RunPictures::Moment> RunPictures::look(const RunRow& row) {
   State& s = *state_;
   if (auto status = s.read_until(row.t); !status) return status.error();
-  const std::uint32_t now_us = s.stamp(row.t);
+  Moment out{s.surface, s.stamp(row.t), {}};
+  if (!row.valid() || s.map.points.empty()) return out;
+  const ContourView view{s.map, s.segments, *s.camera, s.T_body_cam, 0};
+  const auto& chosen = s.visible.choose(row.T_map_body * s.T_body_cam);
+  out.points = project_points(view, chosen, row.T_map_body, &s.surface, out.now_us, kDecay_s);
+  return out;
+}
+
+Expected<RgbImage> RunPictures::draw(const RunRow& row) {
+  const auto moment = look(row);
+  if (!moment) return moment.error();
   std::vector<OverlayPoint> points;
-  if (row.valid()) {
-    const ContourView view{s.map, s.segments, *s.camera, s.T_body_cam, 0};
-    const auto& chosen = s.visible.choose(row.T_map_body * s.T_body_cam);
-    for (const auto& p : project_points(view, chosen, row.T_map_body, &s.surface, now_us, kDecay_s))
-      points.push_back({p.x, p.y, p.matched});
-  }
-  return draw_overlay(s.surface.width(), s.surface.height(), decayed(s.surface, now_us, kDecay_s), points);
+  for (const auto& p : moment->points) points.push_back({p.x, p.y, p.matched});
+  const TimeSurface& surface = moment->surface;
+  return draw_overlay(surface.width(), surface.height(), decayed(surface, moment->now_us, kDecay_s), points);
 }
 
 }  // namespace evpose

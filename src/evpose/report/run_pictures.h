@@ -8,20 +8,28 @@
 #include "evpose/map/contour_map.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/run_files.h"
+#include "evpose/tracker/snapshot.h"
 
 namespace evpose {
 
-/// The map over the events at moments of a run, made again from the recording and the map that it was made
-/// from.
+/// The map over the events at moments of a run, made again from the recording that it was made from.
 class RunPictures {
  public:
-  /// Errors: a live run; a recording or map that is not there any more or cannot be read.
-  static Expected<RunPictures> open(const RunFiles& run);
+  /// `map`: that of the run, read_run_map(); without points the events alone are drawn. Errors: a live run; a
+  /// recording that is not there any more or cannot be read.
+  static Expected<RunPictures> open(const RunFiles& run, ContourMap map);
   RunPictures(RunPictures&&) noexcept;
   RunPictures& operator=(RunPictures&&) noexcept;
   ~RunPictures();
 
+  /// The events of a moment and the map's points in the image; the surface is that of the latest moment.
+  struct Moment {
+    const TimeSurface& surface;
+    std::uint32_t now_us;
+    std::vector<Snapshot::Point> points;  ///< none where there was no pose
+  };
   /// In order of time. Errors: those of reading events.
+  Expected<Moment> look(const RunRow& row);
   Expected<RgbImage> draw(const RunRow& row);
 
   const ContourMap& map() const;

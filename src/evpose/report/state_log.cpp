@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/report/state_log.h"
 
-#include <cinttypes>
-#include <cstdio>
-
 #include "evpose/core/error.h"
 #include "evpose/fusion/state.h"
 
@@ -14,22 +11,7 @@ std::array<double, 5> stages_ms(const StageTimes& t) {
   return {1e3 * t.events_s, 1e3 * t.predict_s, 1e3 * t.choose_s, 1e3 * t.register_s, 1e3 * t.fuse_s};
 }
 
-/// Seconds with all nine decimals.
-std::string seconds_text(TimeNs t) {
-  const bool negative = t < 0;
-  const std::uint64_t magnitude =
-      negative ? 0 - static_cast<std::uint64_t>(t) : static_cast<std::uint64_t>(t);
-  char out[40];
-  std::snprintf(out, sizeof out, "%s%" PRIu64 ".%09" PRIu64, negative ? "-" : "", magnitude / 1'000'000'000,
-                magnitude % 1'000'000'000);
-  return out;
-}
-
-void append(std::string* row, double value) {
-  char out[40];
-  std::snprintf(out, sizeof out, ",%.9g", value);
-  *row += out;
-}
+void append(std::string* row, double value) { append_csv(*row, value); }
 
 void append(std::string* row, const Eigen::Vector3d& v) {
   for (int i = 0; i < 3; ++i) append(row, v[i]);
@@ -83,6 +65,9 @@ void StateLog::add(const Update& u) {
   row.t = u.t;
   row.T_map_body = u.T_map_body;
   row.velocity = u.velocity;
+  row.velocity_sigma = u.velocity_covariance.diagonal().cwiseMax(0).cwiseSqrt().cast<float>();
+  row.gyro_bias = u.gyro_bias.cast<float>();
+  row.accel_bias = u.accel_bias.cast<float>();
   std::size_t k = 0;
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j, ++k) row.covariance[k] = static_cast<float>(u.covariance(i, j));
@@ -103,7 +88,7 @@ std::string states_csv_header() {
 }
 
 std::string states_csv_row(const Update& u) {
-  std::string row = seconds_text(u.t);
+  std::string row = csv_seconds(u.t);
   append(&row, u.T_map_body);
   append(&row, u.velocity);
   append(&row, u.gyro_bias);
@@ -126,7 +111,7 @@ std::string imu_states_csv_header() {
 }
 
 std::string imu_states_csv_row(const FusionState& s) {
-  std::string row = seconds_text(s.t);
+  std::string row = csv_seconds(s.t);
   append(&row, s.nav.T_map_body);
   append(&row, s.nav.velocity);
   append(&row, s.gyro_bias);
@@ -143,7 +128,7 @@ std::string latency_csv_header() {
 }
 
 std::string latency_csv_row(const Update& u) {
-  std::string row = seconds_text(u.t);
+  std::string row = csv_seconds(u.t);
   for (const double ms : stages_ms(u.times)) append(&row, ms);
   return row + "\n";
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "evpose/core/pose.h"
+#include "evpose/report/calibration_log.h"
 #include "evpose/tracker/update.h"
 
 namespace evpose {
@@ -18,7 +19,10 @@ struct StateRow {
   TimeNs t = 0;
   Pose T_map_body;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< map frame, m/s
-  std::array<float, 21> covariance{};                  ///< upper triangle by rows
+  Eigen::Vector3f velocity_sigma = Eigen::Vector3f::Zero();
+  Eigen::Vector3f gyro_bias = Eigen::Vector3f::Zero();   ///< rad/s
+  Eigen::Vector3f accel_bias = Eigen::Vector3f::Zero();  ///< m/s^2
+  std::array<float, 21> covariance{};                    ///< upper triangle by rows
   Health health = Health::waiting;
   std::int32_t events_read = 0, events_kept = 0, points = 0, points_matched = 0;
   std::array<float, 5> stages_ms{};  ///< in the order of kStageNames
@@ -39,7 +43,8 @@ struct HealthChange {
 /// The updates of a run.
 struct StateLog {
   std::vector<StateRow> rows;
-  std::vector<HealthChange> health;  ///< the first state, and each change
+  std::vector<HealthChange> health;         ///< the first state, and each change
+  std::vector<CalibrationRow> calibration;  ///< if any of it is estimated
 
   void add(const Update& update);
 };

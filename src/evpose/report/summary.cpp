@@ -4,16 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "evpose/core/version.h"
 #include "evpose/eval/statistics.h"
-#include "evpose/report/series.h"
+#include "evpose/report/page_parts.h"
 
 namespace evpose {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = PageJson;
 
 LatencyFigures figures(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -152,7 +151,6 @@ std::string status_word(Health at_end) {
   return "lost";
 }
 
-/// Each number with the sigma that it was given with and has in the end.
 Json calibration_json(const RunCalibration& calibration) {
   const auto entry = [](double given, double given_sigma, double found, double sigma) {
     return Json{{"given", rounded(given)},

@@ -319,6 +319,7 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   OverlayWriter overlays(**tracker, *run, job->start.t, job->recording.last_ns, config.overlays);
   (*tracker)->on_update([&](const Update& u) {
     run->add(u);
+    run->add_calibration(u.t, (*tracker)->calibration());
     ++updates;
     most_points = std::max(most_points, u.points);
     overlays.add(u);

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "evpose/report/assets.h"
-
 #define EVPOSE_ASSET(name)                                                          \
   extern "C" const char evpose_asset_##name##_begin[], evpose_asset_##name##_end[]; \
   static std::string name() { return {evpose_asset_##name##_begin, evpose_asset_##name##_end}; }
@@ -13,6 +11,9 @@
 EVPOSE_ASSET(viewer_html)
 EVPOSE_ASSET(viewer_css)
 EVPOSE_ASSET(viewer_js)
+EVPOSE_ASSET(picture_js)
+EVPOSE_ASSET(plots_js)
+EVPOSE_ASSET(plotly_js)
 EVPOSE_ASSET(three_js)
 EVPOSE_ASSET(orbit_js)
 
@@ -44,6 +45,8 @@ void set_viewer_pages(Server& server, const std::string& mode) {
   server.set_page("/", "text/html; charset=utf-8", viewer_html());
   server.set_page("/viewer.css", "text/css; charset=utf-8", viewer_css());
   server.set_page("/viewer.js", script, viewer_js());
+  server.set_page("/picture.js", script, picture_js());
+  server.set_page("/plots.js", script, plots_js());
   server.set_page("/three.js", script, three_js());
   // The library's own word for itself is none that a browser knows without being told.
   std::string orbit = orbit_js();
@@ -51,7 +54,7 @@ void set_viewer_pages(Server& server, const std::string& mode) {
   for (auto at = orbit.find(name); at != std::string::npos; at = orbit.find(name, at))
     orbit.replace(at, name.size(), "from './three.js'");
   server.set_page("/orbit.js", script, std::move(orbit));
-  server.set_page("/plotly.js", script, std::string(assets::plotly_js()));
+  server.set_page("/plotly.js", script, plotly_js());
   server.set_page("/mode.json", "application/json", "{\"mode\":" + quoted(mode) + "}");
   server.set_page("/favicon.ico", "image/x-icon", std::string());
 }

@@ -5,13 +5,17 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <bit>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/view/pages.h"
+#include "evpose/view/picture.h"
+#include "evpose/view/recorded_pictures.h"
 #include "evpose/view/run_view.h"
 
 namespace evpose {
@@ -183,6 +187,56 @@ TEST(ViewPages, ARowHasAColumnForEachNumber) {
   EXPECT_EQ(at("health"), 3);
   EXPECT_EQ(at("baz"), 9);
   EXPECT_TRUE(at("latency_ms").is_null());
+}
+
+TEST(ViewPicture, HoldsTheNewestEventOfEachBlockAndThePoints) {
+  TimeSurface surface(960, 4);  // blocks of 2x2
+  surface.insert(5, 3, Polarity::off, 1'000'000);
+  surface.insert(4, 2, Polarity::on, 999'000);
+  surface.insert(0, 0, Polarity::on, 1'000'000);
+  surface.insert(8, 0, Polarity::on, 500'000);
+  const std::vector<Snapshot::Point> points{{10, 2, true}, {959, 3, false}};
+  const std::string bytes = picture_bytes(surface, 1'000'000, points, 0.5);
+  ASSERT_EQ(bytes.size(), 16u + 480 * 2 + 2 * 12);
+  const auto word = [&](std::size_t at) {
+    std::uint32_t out = 0;
+    std::memcpy(&out, bytes.data() + at, sizeof out);
+    return out;
+  };
+  const auto number = [&](std::size_t at) { return std::bit_cast<float>(word(at)); };
+  const auto pixel = [&](std::size_t x, std::size_t y) {
+    return static_cast<int>(static_cast<unsigned char>(bytes[16 + 480 * y + x]));
+  };
+  EXPECT_EQ(word(0), 480u);
+  EXPECT_EQ(word(4), 2u);
+  EXPECT_EQ(word(8), 2u);
+  EXPECT_EQ(number(12), 0.5f);
+  EXPECT_EQ(pixel(0, 0), 255) << "on, just now";
+  EXPECT_EQ(pixel(2, 1), 1) << "off is the newer one";
+  EXPECT_EQ(pixel(4, 0), 128) << "long ago";
+  EXPECT_EQ(pixel(7, 1), 128) << "never";
+  EXPECT_EQ(number(16 + 960), 5);
+  EXPECT_EQ(number(16 + 960 + 8), 1) << "matched";
+  EXPECT_EQ(number(16 + 960 + 12), 479.5f);
+  EXPECT_EQ(number(16 + 960 + 20), 0) << "not matched";
+}
+
+TEST_F(ViewServer, SaysWhyARunHasNoPictures) {
+  RunFiles live;  // was made from no recording
+  live.folder = "a/run";
+  live.rows.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) live.rows[i].t = static_cast<TimeNs>(i) * 40 * kNsPerMs;
+  const RecordedPictures pictures(*server_, live, ContourMap{});
+  auto answer = nlohmann::json::object();
+  for (int i = 0; i < 400 && answer.value("fault", "").empty(); ++i) {
+    const std::string page = ask("GET /pictures.json");
+    answer = nlohmann::json::parse(page.substr(page.find("\r\n\r\n") + 4));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(answer["fault"], "a/run: does not say what it was made from; give a run of evpose track");
+  EXPECT_EQ(answer["made"], 0);
+  EXPECT_EQ(answer["t"], nlohmann::json::parse("[0.0, 0.08]")) << "not nearer than 50 ms";
+  EXPECT_EQ(ask("GET /picture/0").rfind("HTTP/1.1 404", 0), 0u);
 }
 
 TEST(ViewRun, WhatIsNoRunIsNamed) {

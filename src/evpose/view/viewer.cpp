@@ -7,16 +7,14 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "evpose/registration/temporal_field.h"
 #include "evpose/view/pages.h"
+#include "evpose/view/picture.h"
 
 namespace evpose {
 namespace {
 
 constexpr TimeNs kRow = 33 * kNsPerMs, kFlush = 66 * kNsPerMs, kPicture = 200 * kNsPerMs;  // of data time
 constexpr std::size_t kMostHistory = 30 * 60 * 20;  // rows: twenty minutes
-constexpr int kWidest = 480;                        // px of a picture
-constexpr double kDecay_s = 0.02;
 
 std::string rows_json(auto begin, auto end) {
   std::string out = "[";
@@ -150,57 +148,10 @@ void Viewer::notice(const std::string& words) {
 }
 
 void Viewer::draw(const Tracker& tracker, const Update& u) {
-  server_->publish({std::make_shared<std::string>(picture_of(tracker, u.t, to_seconds(u.t - first_))), true});
-}
-
-namespace {
-
-/// Of the paper's field at a projected point: 0 where an event has just been, 1 where none was for long.
-float residual_at(const TimeSurface& surface, const Snapshot::Point& p, std::uint32_t now_us) {
-  const Eigen::Vector2d pixel(static_cast<double>(p.x), static_cast<double>(p.y));
-  return static_cast<float>(
-      1 - sample_field(surface, pixel, now_us, 1e6 * kDecay_s, FieldKernel::bilinear).value);
-}
-
-}  // namespace
-
-std::string picture_of(const Tracker& tracker, TimeNs t, double t_s) {
   EVPOSE_CHECK(tracker.events().surface() != nullptr);
-  const TimeSurface& surface = *tracker.events().surface();
-  const std::uint32_t now_us = tracker.events().stamp(t);
-  const int step = (surface.width() + kWidest - 1) / kWidest;
-  const int width = surface.width() / step, height = surface.height() / step;
-  // exp(-age / 20 ms) by steps of 1.024 ms.
-  std::array<unsigned char, 128> shade{};
-  for (std::size_t i = 0; i < shade.size(); ++i)
-    shade[i] = static_cast<unsigned char>(
-        std::lround(127 * std::exp(-1.024e-3 * static_cast<double>(i) / kDecay_s)));
-  const auto points = tracker.chosen_points(kDecay_s);
-  std::string out;
-  const auto put = [&](auto value) { out.append(reinterpret_cast<const char*>(&value), sizeof value); };
-  put(static_cast<std::uint32_t>(width)), put(static_cast<std::uint32_t>(height));
-  put(static_cast<std::uint32_t>(points.size()));
-  put(static_cast<float>(t_s));
-  out.reserve(out.size() + static_cast<std::size_t>(width) * static_cast<std::size_t>(height) +
-              12 * points.size() + 4);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      std::uint32_t on = 0, off = 0;
-      for (int dy = 0; dy < step; ++dy)
-        for (int dx = 0; dx < step; ++dx) {
-          on = std::max(on, surface.last(x * step + dx, y * step + dy, Polarity::on));
-          off = std::max(off, surface.last(x * step + dx, y * step + dy, Polarity::off));
-        }
-      const std::uint32_t last = std::max(on, off);
-      const std::uint32_t age =
-          last == 0 ? 127 : std::min<std::uint32_t>((now_us > last ? now_us - last : 0) >> 10, 127);
-      out += static_cast<char>(on >= off ? 128 + shade[age] : 128 - shade[age]);
-    }
-  while (out.size() % 4 != 0) out += '\0';
-  for (const auto& p : points)
-    put(p.x / static_cast<float>(step)), put(p.y / static_cast<float>(step)),
-        put(residual_at(surface, p, now_us));
-  return out;
+  const std::string picture = picture_bytes(*tracker.events().surface(), tracker.events().stamp(u.t),
+                                            tracker.chosen_points(kPictureDecay_s), to_seconds(u.t - first_));
+  server_->publish({std::make_shared<std::string>(picture), true});
 }
 
 }  // namespace evpose

@@ -53,9 +53,4 @@ class Viewer {
   std::unique_ptr<Server> server_;  ///< last: its thread reads the others
 };
 
-/// The picture of a tracker's surface, half a megapixel at most: u32 width, height, points; f32 seconds; then
-/// a byte for each pixel (128: nothing; more: on, less: off, the newer the further) and f32 x, y in the
-/// picture's pixels and residual of the decaying field, 0 to 1, for each point.
-std::string picture_of(const Tracker& tracker, TimeNs t, double t_s);
-
 }  // namespace evpose

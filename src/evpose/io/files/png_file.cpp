@@ -4,6 +4,7 @@
 #include <png.h>
 
 #include <csetjmp>
+#include <unordered_map>
 
 #include "evpose/io/files/atomic_file.h"
 
@@ -19,6 +20,7 @@ struct Pixels {
   int color_type = PNG_COLOR_TYPE_GRAY;
   int channels = 1, bits = 8;           ///< samples of 16 bits are in the order of this machine
   const std::uint8_t* bytes = nullptr;  ///< row by row
+  std::vector<png_color> palette{};
 };
 
 /// Empty when memory is short.
@@ -36,6 +38,10 @@ std::string encode(const Pixels& pixels) {
   png_set_IHDR(png, info, static_cast<png_uint_32>(pixels.width), static_cast<png_uint_32>(pixels.height),
                pixels.bits, pixels.color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                PNG_FILTER_TYPE_DEFAULT);
+  if (!pixels.palette.empty()) {
+    png_set_PLTE(png, info, pixels.palette.data(), static_cast<int>(pixels.palette.size()));
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);  // numbers have no slope
+  }
   png_set_compression_level(png, kCompressionLevel);
   png_write_info(png, info);
   if (pixels.bits == 16) png_set_swap(png);
@@ -44,6 +50,28 @@ std::string encode(const Pixels& pixels) {
   png_write_end(png, info);
   png_destroy_write_struct(&png, &info);
   return bytes;
+}
+
+/// The image's colours in the order of their first pixels and a number for each pixel; no palette if there
+/// are more than 256.
+struct PaletteImage {
+  std::vector<png_color> palette;
+  std::vector<std::uint8_t> numbers;
+};
+
+PaletteImage with_palette(const RgbImage& image) {
+  PaletteImage out;
+  std::unordered_map<std::uint32_t, std::uint8_t> known;
+  out.numbers.reserve(image.rgb.size() / 3);
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+    const std::uint8_t* c = &image.rgb[i];
+    const std::uint32_t colour = (std::uint32_t{c[0]} << 16) | (std::uint32_t{c[1]} << 8) | c[2];
+    const auto [found, is_new] = known.try_emplace(colour, static_cast<std::uint8_t>(out.palette.size()));
+    if (is_new && out.palette.size() == 256) return {};
+    if (is_new) out.palette.push_back({c[0], c[1], c[2]});
+    out.numbers.push_back(found->second);
+  }
+  return out;
 }
 
 Status write_grey(const std::string& path, const Pixels& pixels) {
@@ -55,11 +83,14 @@ Status write_grey(const std::string& path, const Pixels& pixels) {
 }  // namespace
 
 std::string encode_png(const RgbImage& image) {
-  std::string bytes = encode({.width = image.width,
-                              .height = image.height,
-                              .color_type = PNG_COLOR_TYPE_RGB,
-                              .channels = 3,
-                              .bytes = image.rgb.data()});
+  PaletteImage few = with_palette(image);
+  const bool all = few.palette.empty();
+  const std::string bytes = encode({.width = image.width,
+                                    .height = image.height,
+                                    .color_type = all ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_PALETTE,
+                                    .channels = all ? 3 : 1,
+                                    .bytes = all ? image.rgb.data() : few.numbers.data(),
+                                    .palette = std::move(few.palette)});
   EVPOSE_CHECK(!bytes.empty());
   return bytes;
 }

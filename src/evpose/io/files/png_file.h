@@ -24,7 +24,8 @@ struct RgbImage {
   }
 };
 
-/// The bytes of a PNG file. An empty image is a fault of ours.
+/// The bytes of a PNG file, with a palette where there are no more than 256 colours. An empty image is a
+/// fault of ours.
 std::string encode_png(const RgbImage& image);
 
 /// Grey pictures, rows from the top. Faults of ours: an empty picture, a size that does not fit.

@@ -7,26 +7,35 @@
 #include <algorithm>
 #include <cstring>
 #include <numeric>
+#include <random>
 
 #include "evpose/io/files/test_files.h"
 
 namespace evpose {
 namespace {
 
-TEST(Png, ColoursDecodeToTheSameImage) {
-  RgbImage image(5, 3);
-  std::iota(image.rgb.begin(), image.rgb.end(), std::uint8_t{7});
+/// Values of each channel: eight colours, which have a palette, or a thousand, which have none.
+class PngColours : public testing::TestWithParam<int> {};
+
+TEST_P(PngColours, DecodeToTheSameImage) {
+  RgbImage image(40, 30);
+  std::mt19937 random(1);
+  for (std::uint8_t& byte : image.rgb)
+    byte = static_cast<std::uint8_t>(random() % static_cast<unsigned>(GetParam()));
   const std::string bytes = encode_png(image);
+  constexpr std::size_t kColourType = 25;  // of the header
+  EXPECT_EQ(bytes[kColourType], GetParam() == 2 ? PNG_COLOR_TYPE_PALETTE : PNG_COLOR_TYPE_RGB);
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
   png.format = PNG_FORMAT_RGB;
-  ASSERT_EQ(png.width, 5u);
-  ASSERT_EQ(png.height, 3u);
-  std::vector<std::uint8_t> rgb(image.rgb.size());
-  ASSERT_NE(png_image_finish_read(&png, nullptr, rgb.data(), 0, nullptr), 0);
-  EXPECT_EQ(rgb, image.rgb);
+  ASSERT_EQ(png.width, 40u);
+  ASSERT_EQ(png.height, 30u);
+  std::vector<std::uint8_t> decoded(PNG_IMAGE_SIZE(png));
+  ASSERT_NE(png_image_finish_read(&png, nullptr, decoded.data(), 0, nullptr), 0);
+  EXPECT_EQ(decoded, image.rgb);
 }
+INSTANTIATE_TEST_SUITE_P(FewAndMany, PngColours, testing::Values(2, 256));
 
 /// The samples of a grey file, as libpng gives them back.
 template <class T>

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs as numpy arrays, and making them.
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <cmath>
+#include <map>
+
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/report/csv_table.h"
+#include "evpose/report/run_files.h"
+#include "evpose/run/track_recording.h"
+#include "evpose_files.h"
+
+namespace py = pybind11;
+namespace fs = std::filesystem;
+
+namespace evpose {
+namespace {
+
+/// (n, size, size) of a matrix for each row.
+py::array_t<double> matrices_of(const RunFiles& run, int size, auto&& matrix) {
+  py::array_t<double> out({static_cast<py::ssize_t>(run.rows.size()), py::ssize_t{size}, py::ssize_t{size}});
+  double* to = out.mutable_data();
+  for (const RunRow& row : run.rows) {
+    const auto value = matrix(row);
+    for (int r = 0; r < size; ++r)
+      for (int c = 0; c < size; ++c) *to++ = value(r, c);
+  }
+  return out;
+}
+
+template <class T>
+py::array_t<T> column_of(const RunFiles& run, auto&& value) {
+  py::array_t<T> out(static_cast<py::ssize_t>(run.rows.size()));
+  for (std::size_t i = 0; i < run.rows.size(); ++i) out.mutable_data()[i] = value(run.rows[i]);
+  return out;
+}
+
+/// The columns of numbers of a file of the run, by name.
+std::map<std::string, py::array_t<double>> table_of(const RunFiles& run, const std::string& file) {
+  const auto content = read_text_file(run.folder + "/" + file);
+  if (!content) throw py::value_error(content.error().line());
+  const CsvTable table(*content);
+  std::map<std::string, py::array_t<double>> out;
+  for (const auto& [name, number] : table.columns) {
+    if (name == "health" || name == "reason") continue;
+    py::array_t<double> column(static_cast<py::ssize_t>(table.rows.size()));
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+      CsvRow row(table, table.rows[i]);
+      const double value = row.number(name);
+      column.mutable_data()[i] = row.sound() ? value : NAN;
+    }
+    out.emplace(std::string(name), column);
+  }
+  return out;
+}
+
+py::object summary_of(const RunFiles& run) {
+  const auto content = read_text_file(run.folder + "/summary.json");
+  if (!content) throw py::value_error(content.error().line());
+  return py::module_::import("json").attr("loads")(*content);
+}
+
+RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
+               const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
+               const std::map<std::string, py::object>& settings, bool replace) {
+  TrackRequest request;
+  request.recording = recording.string();
+  request.output = output.string();
+  request.map = map.string();
+  request.calibration = calibration.string();
+  request.occluders = occluders.string();
+  request.init = init;
+  request.init_sigma = {init_sigma.first, init_sigma.second};
+  for (const auto& [key, setting] : settings) request.assignments.push_back(key + "=" + setting_text(setting));
+  request.replace = replace;
+  request.interrupted = [] {
+    const py::gil_scoped_acquire acquire;
+    return PyErr_CheckSignals() != 0;
+  };
+  auto outcome = [&] {
+    const py::gil_scoped_release release;
+    return track_recording(request);
+  }();
+  if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+  value_of(std::move(outcome));
+  return value_of(read_run_files(output.string()));
+}
+
+}  // namespace
+
+void bind_runs(py::module_& m) {
+  using namespace py::literals;
+  py::class_<RunFiles>(m, "Run", "A run folder of evpose track: a row for each update; arrays are copies")
+      .def(py::init([](const fs::path& folder) { return value_of(read_run_files(folder.string())); }), "folder"_a,
+           "ValueError says what is wrong")
+      .def_readonly("folder", &RunFiles::folder, "where it stands")
+      .def_property_readonly(
+          "t_ns",
+          [](const RunFiles& r) { return column_of<std::int64_t>(r, [](const RunRow& row) { return row.t; }); },
+          "(n,), data time")
+      .def_property_readonly(
+          "T_map_body",
+          [](const RunFiles& r) {
+            return matrices_of(r, 4, [](const RunRow& row) { return row.T_map_body.matrix(); });
+          },
+          "(n, 4, 4)")
+      .def_property_readonly(
+          "covariance",
+          [](const RunFiles& r) { return matrices_of(r, 6, [](const RunRow& row) { return row.covariance; }); },
+          "(n, 6, 6) of (translation in the map, rotation in the body), m^2, rad^2")
+      .def_property_readonly(
+          "valid",
+          [](const RunFiles& r) { return column_of<bool>(r, [](const RunRow& row) { return row.valid(); }); },
+          "(n,): the tracker stands by the pose")
+      .def_property_readonly(
+          "health",
+          [](const RunFiles& r) {
+            std::vector<std::string> out;
+            for (const RunRow& row : r.rows) out.emplace_back(to_string(row.health));
+            return out;
+          },
+          "waiting, initialising, tracking, degraded or lost")
+      .def_property_readonly("summary", &summary_of, "what summary.json says")
+      .def("table", &table_of, "file"_a = "states.csv",
+           "Columns of numbers of states.csv, states_imu.csv, calibration.csv or latency.csv, by name");
+  m.def("track", &track, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
+        "init"_a = "auto", "init_sigma"_a = std::pair<double, double>(0, 0),
+        "settings"_a = std::map<std::string, py::object>{}, "replace"_a = false,
+        "What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched first");
+}
+
+}  // namespace evpose

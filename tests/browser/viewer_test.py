@@ -129,7 +129,8 @@ def plays(page):
     expect(page.wait_for(f"Number({DATA}.t) > 0.1", 30), "plays")
     stopped = "document.getElementById('play').textContent === 'play'"
     expect(page.wait_for(f"{slider}.value === {slider}.max && {stopped}", 60), "plays to the end and stops")
-    expect(page.wait_for(f"Number({DATA}.pictures) > 2 && Number({DATA}.matched) > 50", 30), "pictures of the run")
+    # How many come on the way depends on the machine.
+    expect(page.wait_for(f"Number({DATA}.pictures) > 0 && Number({DATA}.matched) > 50", 60), "pictures of the run")
     expect(page.run(COLOURS % "picture") > 3, "the picture shows events")
 
 
@@ -143,8 +144,10 @@ def recorded(browser, recording):
         expect(page.wait_for(f"{DATA}.connection === 'recorded' && Number({DATA}.plots) === 6", 60), "loads the run")
         plays(page)
         end = page.run(f"{DATA}.pose")
+        pictures = page.run(f"{DATA}.pictures")
         wanted = page.run(SCRUB % 0.75)
         expect(abs(float(page.run(f"{DATA}.t")) - wanted) < 0.01, "scrubs the run")
+        expect(page.wait_for(f"Number({DATA}.pictures) > {pictures}", 60), "another picture")
         expect(page.run(f"{DATA}.pose") != end, "to another pose")
         look(page, "run", port)
         page.close()

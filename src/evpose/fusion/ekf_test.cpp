@@ -207,8 +207,7 @@ std::vector<ContourOffset> late_contours(std::mt19937& random, const NavState& t
   for (std::size_t i = 0; i < out.size(); ++i) {
     ContourOffset& c = out[i];
     const auto direction = static_cast<Eigen::Index>(i % 8);
-    c.normal_px =
-        Eigen::Rotation2Dd(static_cast<double>(direction) * EIGEN_PI / 4) * Eigen::Vector2d::UnitX();
+    c.normal_px = Eigen::Rotation2Dd(static_cast<double>(direction) * M_PI_4) * Eigen::Vector2d::UnitX();
     c.point_body = {normal(random), normal(random), 3 + 0.3 * normal(random)};
     c.across_body << 100 * c.normal_px, 0;
     c.darker = i % 3 == 0 ? -1 : 1;

@@ -220,11 +220,16 @@ std::vector<ContourOffset> late_contours(std::mt19937& random, const NavState& t
   return out;
 }
 
-TEST(Ekf, ReportsACovarianceThatHoldsWithErrorsThatContoursShare) {
+/// NEES/6 at the end of flights in which contours share errors of these sizes.
+struct SharedErrorsNees {
+  double own = 0, reported = 0;
+};
+
+SharedErrorsNees fly_with_shared_errors(double offset_sigma_px, double map_sigma_m) {
   std::mt19937 random(6);
   std::normal_distribution<double> normal;
   const StatePropagator propagator(MotionModel::constant_velocity, FusionConfig{}, ImuNoise{});
-  double own = 0, reported = 0;
+  SharedErrorsNees out;
   constexpr int kFlights = 200;
   for (int flight = 0; flight < kFlights; ++flight) {
     Ekf ekf(propagator);
@@ -232,26 +237,40 @@ TEST(Ekf, ReportsACovarianceThatHoldsWithErrorsThatContoursShare) {
     ekf.start(0, truth, {0, 0, 0});
     const double delay_s = 2e-3 * normal(random);
     Eigen::Matrix<double, 8, 1> offsets_px;
-    for (double& offset : offsets_px) offset = 0.08 * normal(random);
+    for (double& offset : offsets_px) offset = offset_sigma_px * normal(random);
     for (int k = 1; k <= 100; ++k) {
       ekf.predict(k * 3 * kNsPerMs);
       PoseInformation pose;
-      const auto contours = late_contours(random, truth, ekf.state().nav, delay_s, offsets_px);
-      for (const ContourOffset& c : contours) {
+      auto contours = late_contours(random, truth, ekf.state().nav, delay_s, offsets_px);
+      for (ContourOffset& c : contours) {
         const Vector6d by_pose = c.by_pose(ekf.state().nav.T_map_body.rotation());
+        c.sigma_m = map_sigma_m;
         pose.information += c.weight * by_pose * by_pose.transpose();
         pose.vector += c.weight * c.offset_px * by_pose;
       }
       ekf.update(pose, contours);
     }
     const Vector6d e = truth.T_map_body.minus(ekf.state().nav.T_map_body);
-    own += e.dot(ekf.state().pose_covariance().ldlt().solve(e)) / 6 / kFlights;
-    reported += e.dot(ekf.reported_state().pose_covariance().ldlt().solve(e)) / 6 / kFlights;
+    out.own += e.dot(ekf.state().pose_covariance().ldlt().solve(e)) / 6 / kFlights;
+    out.reported += e.dot(ekf.reported_state().pose_covariance().ldlt().solve(e)) / 6 / kFlights;
   }
-  EXPECT_GT(own, 2);
-  // A little cautious: nothing moves, while constant velocity allows that it does.
-  EXPECT_GT(reported, 0.7);
-  EXPECT_LT(reported, 1.2);
+  return out;
+}
+
+// A little cautious: nothing moves, while constant velocity allows that it does.
+TEST(Ekf, ReportsACovarianceThatHoldsWithErrorsThatContoursShare) {
+  const SharedErrorsNees nees = fly_with_shared_errors(0.08, 0);
+  EXPECT_GT(nees.own, 2);
+  EXPECT_GT(nees.reported, 0.7);
+  EXPECT_LT(nees.reported, 1.2);
+}
+
+TEST(Ekf, ReportsACovarianceThatHoldsWithAMapWhoseFacesAreMisplaced) {
+  // Three of the map's sigmas, at 100 px a metre.
+  const SharedErrorsNees nees = fly_with_shared_errors(std::hypot(0.08, 0.6), 2e-3);
+  EXPECT_GT(nees.own, 20);
+  EXPECT_GT(nees.reported, 0.7);
+  EXPECT_LT(nees.reported, 1.2);
 }
 
 TEST(Ekf, ConstantVelocityLearnsTwistFromPosesAlone) {

@@ -11,6 +11,7 @@ namespace {
 
 // Of one sigma; docs/decisions/tracking.md has what they were chosen on.
 constexpr double kDelay_s = 2e-3, kOffset_px = 0.08;
+constexpr double kOfMap = 3;  // the offset of a built map's contours, in sigmas that the map states
 
 int direction_of(const Eigen::Vector2d& normal_px) {
   constexpr double kWidth_rad = 2 * std::numbers::pi / SharedErrors::kDirections;
@@ -24,7 +25,8 @@ void SharedErrors::add(const ContourOffset& contour, const BlockSample& sample,
                        JointMeasurement& measurement) {
   measurement.add_shared_error(0, kDelay_s * contour.speed_px_s, sample);
   const int side = contour.darker < 0 ? -1 : 1;
-  measurement.add_shared_error(1 + direction_of(side * contour.normal_px), side * kOffset_px, sample);
+  const double offset_px = std::hypot(kOffset_px, kOfMap * contour.sigma_m * contour.across_body.norm());
+  measurement.add_shared_error(1 + direction_of(side * contour.normal_px), side * offset_px, sample);
 }
 
 }  // namespace evpose

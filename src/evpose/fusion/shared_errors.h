@@ -9,8 +9,9 @@ struct ContourOffset;
 
 /// Errors that the contours of one flight share, so that they do not average out: how late the events come
 /// where the light is dim, and by how much all edges of one direction stand off (light and shade beside an
-/// edge, contrast that the edge delay does not know). The filter's gain does not know of them. What they do
-/// to its estimate is followed (ErrorStateFilter::follow_shared_errors) and belongs to the pose's covariance.
+/// edge, contrast that the edge delay does not know, faces that a map has in the wrong place). The filter's
+/// gain does not know of them. What they do to its estimate is followed
+/// (ErrorStateFilter::follow_shared_errors) and belongs to the pose's covariance.
 ///
 /// Estimated instead, they and a pose that drifts along its motion confirm each other.
 struct SharedErrors {

@@ -27,7 +27,7 @@ BENCHMARKS = {
     "ablation": ("experiments", "make_ablation", "the tracker without one of its parts; its picture", "10 min"),
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
-    "relocalization": ("experiments", "make_relocalization", "starts from wrong poses", "20 min"),
+    "relocalization": ("experiments", "make_relocalization", "starts from wrong poses and with wrong maps", "20 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
     "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "15 min"),

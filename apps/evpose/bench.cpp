@@ -76,7 +76,7 @@ void add_calibration_errors(CLI::App& bench, Run& run) {
 }
 
 void add_relocalization(CLI::App& bench, Run& run) {
-  auto* command = bench.add_subcommand("relocalization", "Starts from wrong poses");
+  auto* command = bench.add_subcommand("relocalize", "Starts from wrong poses, and with wrong maps");
   auto request = std::make_shared<experiments::RelocalizationRequest>();
   add_selection(*command, request->selection);
   command->add_option("--seeds", request->seeds, "starts for each recording and class")

@@ -7,17 +7,21 @@
 #include <optional>
 #include <random>
 
+#include "evpose/registration/coarse_ranking.h"
+
 namespace evpose {
 namespace {
 
-constexpr int kGuesses = 8000;                // few for 30 cm and 5 deg at 1280x720, and each takes time
-constexpr std::size_t kRefined = 80;          // of the guesses
+constexpr int kGuesses = 20000;
+constexpr std::size_t kRefined = 48;          // of the guesses
 constexpr std::size_t kKept = 16;             // of the refined ones, for later slices to choose from
 constexpr double kSeenShare = 0.3;            // of the contours in view, motion makes so many visible
 constexpr std::size_t kComparedPoints = 200;  // enough to rank guesses
 constexpr double kOutsideScore = -0.3;        // of a point that has left the image: neither good nor bad
 constexpr double kCorrelatedPoints = 10;      // so many points share one error
-constexpr int kIterations = 5;                // at each width of the kernel
+constexpr std::size_t kRefinedPoints = 250;   // enough to move a guess to its optimum
+constexpr int kIterations = 3;                // at each width of the kernel
+constexpr double kLastReach_px = 3;           // of the refinement with all points
 constexpr double kNarrowing = 0.6;            // of the kernel, from width to width
 constexpr double kNarrowest_px = 1;           // the sharpness of the edges
 constexpr double kConverged = 0.05;    // a step below this share of the kernel's width ends the iterations
@@ -78,6 +82,12 @@ double image_motion_px(const Vector6d& step, double focal_px) {
   return focal_px * (step.head<3>().norm() / kTypicalDepth_m + step.tail<3>().norm());
 }
 
+/// The same between two poses, for small angles.
+double image_motion_px(const Pose& a, const Pose& b, double focal_px) {
+  const double turn = 2 * (a.q.conjugate() * b.q).vec().norm();
+  return focal_px * ((a.p - b.p).norm() / kTypicalDepth_m + turn);
+}
+
 /// Sorts, best first, and keeps the first of those that are one pose.
 void keep_different(std::vector<PoseGuess>& guesses, std::size_t most, double focal_px) {
   std::stable_sort(guesses.begin(), guesses.end(),
@@ -86,7 +96,7 @@ void keep_different(std::vector<PoseGuess>& guesses, std::size_t most, double fo
   for (const PoseGuess& g : guesses) {
     if (out.size() == most) break;
     if (std::none_of(out.begin(), out.end(), [&](const PoseGuess& o) {
-          return image_motion_px(o.T_map_body.minus(g.T_map_body), focal_px) < kDifferent_px;
+          return image_motion_px(o.T_map_body, g.T_map_body, focal_px) < kDifferent_px;
         }))
       out.push_back(g);
   }
@@ -128,23 +138,48 @@ NormalEquations linearise(const SearchView& view, const Pose& pose, const Pose& 
   return out;
 }
 
+/// Poses of the prior, each with its score. The prior itself is the first.
+std::vector<PoseGuess> draw_guesses(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
+                                    unsigned seed) {
+  std::mt19937 random(seed);
+  const Matrix6d root = covariance.llt().matrixL();
+  CoarseScores scores(view.field, view.camera, static_cast<float>(kSeenShare),
+                      static_cast<float>(kOutsideScore));
+  scores.set_points(view.points, std::max<std::size_t>(1, view.points.size() / kComparedPoints), prior.p);
+  const Pose T_cam_body = view.T_body_cam.inverse();
+  std::vector<PoseGuess> guesses(kGuesses);
+  for (PoseGuess& g : guesses) {
+    g.T_map_body = &g == guesses.data() ? prior : prior.plus(root * standard_normal(random));
+    const Pose T_cam_map = T_cam_body * g.T_map_body.inverse();
+    g.score = scores.score(T_cam_map.rotation().cast<float>(), (T_cam_map * prior.p).cast<float>());
+  }
+  return guesses;
+}
+
+/// So many of the points, evenly.
+std::vector<SearchPoint> thinned(std::span<const SearchPoint> points, std::size_t most) {
+  const std::size_t step = std::max<std::size_t>(1, points.size() / most);
+  std::vector<SearchPoint> out;
+  for (std::size_t i = 0; i < points.size(); i += step) out.push_back(points[i]);
+  return out;
+}
+
 }  // namespace
 
 double refine_reach_px() { return 2 * static_cast<double>(EdgeField::spread_px(EdgeSpread::coarse)); }
 
-double score_pose(const SearchView& view, const Pose& T_map_body, EdgeSpread spread, std::size_t step) {
+double score_pose(const SearchView& view, const Pose& T_map_body, EdgeSpread spread) {
   const Projector project(view, T_map_body);
   const auto share = static_cast<float>(kSeenShare);
   double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < view.points.size(); i += step, ++count) {
-    const std::optional<Projection> seen = project(view.points[i]);
+  for (const SearchPoint& point : view.points) {
+    const std::optional<Projection> seen = project(point);
     sum += seen ? std::log(1 - share +
                            share * view.field.likelihood_ratio(seen->pixel.x(), seen->pixel.y(),
                                                                seen->direction, spread))
                 : kOutsideScore;
   }
-  return count > 0 ? sum / static_cast<double>(count) : 0;
+  return view.points.empty() ? 0 : sum / static_cast<double>(view.points.size());
 }
 
 PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& prior_information,
@@ -163,27 +198,25 @@ PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& 
 
 std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
                                    unsigned seed) {
-  std::mt19937 random(seed);
-  const Matrix6d root = covariance.llt().matrixL();
-  const std::size_t step = std::max<std::size_t>(1, view.points.size() / kComparedPoints);
-  std::vector<PoseGuess> guesses;
-  for (int i = 0; i < kGuesses; ++i) {
-    // The prior itself is the first guess.
-    const Pose pose = i == 0 ? prior : prior.plus(root * standard_normal(random));
-    guesses.push_back({pose, score_pose(view, pose, EdgeSpread::coarse, step)});
-  }
   const double focal_px = view.camera.focal_px();
+  std::vector<PoseGuess> guesses = draw_guesses(view, prior, covariance, seed);
   const PoseGuess first = guesses.front();
   keep_different(guesses, kRefined, focal_px);
   guesses.push_back(first);
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
   const double evidence = static_cast<double>(view.points.size()) / kCorrelatedPoints;
-  for (PoseGuess& g : guesses) {
-    g = refine_pose(view, g.T_map_body, information, refine_reach_px());
-    const Vector6d off = g.T_map_body.minus(prior);
-    g.score -= 0.5 * off.dot(information * off) / evidence;
-  }
-  keep_different(guesses, kKept, focal_px);
+  const std::vector<SearchPoint> some = thinned(view.points, kRefinedPoints);
+  const SearchView coarse{view.field, view.camera, view.T_body_cam, some};
+  const auto refine = [&](const SearchView& seen, double from_px) {
+    for (PoseGuess& g : guesses) {
+      g = refine_pose(seen, g.T_map_body, information, from_px);
+      const Vector6d off = g.T_map_body.minus(prior);
+      g.score -= 0.5 * off.dot(information * off) / evidence;
+    }
+    keep_different(guesses, kKept, focal_px);
+  };
+  refine(coarse, refine_reach_px());
+  refine(view, kLastReach_px);
   return guesses;
 }
 

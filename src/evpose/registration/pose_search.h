@@ -44,8 +44,8 @@ std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, co
 PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& prior_information,
                       double from_px);
 
-/// Score of a pose; only every `step`-th point is asked.
-double score_pose(const SearchView& view, const Pose& T_map_body, EdgeSpread spread, std::size_t step = 1);
+/// Score of a pose.
+double score_pose(const SearchView& view, const Pose& T_map_body, EdgeSpread spread);
 
 /// How far contours may be off when a guess is refined, px.
 double refine_reach_px();

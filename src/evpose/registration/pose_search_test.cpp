@@ -7,6 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "evpose/registration/coarse_ranking.h"
+
 namespace evpose {
 namespace {
 
@@ -111,6 +113,20 @@ TEST_F(PoseSearchLaws, TheTruePoseScoresBest) {
     d(axis) = 0.04;
     EXPECT_GT(best, score_pose(view(), Pose{}.plus(d), EdgeSpread::fine) + 0.03) << axis;
   }
+}
+
+TEST_F(PoseSearchLaws, TheTableOfScoresSaysWhatTheFieldDoes) {
+  CoarseScores table(field_, *camera_, 0.3F, -0.3F);
+  table.set_points(points_, 1, Eigen::Vector3d::Zero());
+  for (int axis = 0; axis < 6; ++axis)
+    for (const double off : {0.0, 0.03, -0.06, 0.2}) {
+      Vector6d d = Vector6d::Zero();
+      d(axis) = off;
+      const Pose T_cam_map = Pose{}.plus(d).inverse();
+      EXPECT_NEAR(table.score(T_cam_map.rotation().cast<float>(), T_cam_map.p.cast<float>()),
+                  score_pose(view(), Pose{}.plus(d), EdgeSpread::coarse), 0.1)
+          << axis << ' ' << off;
+    }
 }
 
 TEST_F(PoseSearchLaws, RefiningReturnsToTheTruePose) {

@@ -21,6 +21,9 @@ struct Explanation {
 };
 constexpr const char* kSearch = "searching for the pose";  // follows from something else, mostly
 constexpr std::array kExplanations{
+    Explanation{"not in this map",
+                "the map is of another place or mirrored, or the start is further off than was said",
+                "check --map and --init; give the start's true error with --init-sigma"},
     Explanation{"do not gather", "wrong map, start or calibration: contours are not where the events are",
                 "look at the report's pictures: contours must lie on events; `evpose check` the recording"},
     Explanation{"IMU contradicts", "axes, units or clock of the IMU do not fit the camera's",

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/tracker/health.h"
 
+#include <utility>
+
 #include "evpose/core/config.h"
 
 namespace evpose {
@@ -24,7 +26,7 @@ void describe(ConfigTable& table, HealthConfig& c) {
 void HealthMonitor::start(TimeNs t) {
   state_ = Health::initialising;
   started_ = last_accepted_ = t;
-  any_accepted_ = false;
+  any_accepted_ = contradicted_ = hopeless_ = false;
 }
 
 Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
@@ -32,19 +34,25 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
   const double silent_s = to_seconds(e.t - last_accepted_);
   Health next = Health::tracking;
   std::string why;
-  if (e.searching) {
+  if (e.hopeless) {
+    next = Health::lost;
+    why = e.contradicted;
+  } else if (e.searching) {
     next = any_accepted_ ? Health::lost : Health::initialising;
-    why = e.refused;
+    why = e.contradicted.empty() ? e.refused : e.refused + ": " + e.contradicted;
   } else if (!(e.sigma_px <= config_.lost_sigma_px)) {
     next = Health::lost;
     why = text("pose uncertain by ", e.sigma_px, " px, beyond the limit of ", config_.lost_sigma_px, " px");
     if (!e.refused.empty()) why += ": " + e.refused;
-  } else if (!any_accepted_ || to_seconds(e.t - started_) < kInitialise_s) {
+  } else if (!any_accepted_ || !e.verified || to_seconds(e.t - started_) < kInitialise_s) {
     next = Health::initialising;
-    why = "collecting events";
+    why = e.contradicted.empty() ? "collecting events" : e.contradicted;
   } else if (silent_s > config_.degraded_after_s) {
     next = Health::degraded;
     why = text("no registration for ", config_.degraded_after_s, " s: ", e.refused);
+  } else if (!e.contradicted.empty()) {
+    next = Health::degraded;
+    why = e.contradicted;
   } else if (!e.fault.empty()) {
     next = Health::degraded;
     why = e.fault;
@@ -52,8 +60,14 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
     next = Health::degraded;
     why = text("pose uncertain by ", e.sigma_px, " px: ", e.weakest);
   }
-  reason->clear();
-  if (next != state_) *reason = next == Health::tracking ? "contours and events agree" : why;
+  const bool contradicted = !e.contradicted.empty();
+  bool news = contradicted != std::exchange(contradicted_, contradicted);
+  news |= e.hopeless != std::exchange(hopeless_, e.hopeless);
+  if (next == Health::tracking)
+    why = next == state_ ? "" : "contours and events agree";
+  else if (next == state_ && !news)
+    why.clear();
+  *reason = std::move(why);
   return state_ = next;
 }
 

@@ -31,6 +31,9 @@ struct Evidence {
   double sigma_px = 0;  ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
   std::string weakest;  ///< that direction in words
   std::string fault;    ///< what is wrong with the data, if anything
+  bool verified = true;           ///< the events have confirmed the pose since it was given or found
+  std::string contradicted = {};  ///< what speaks against the pose, if the events do
+  bool hopeless = false;          ///< for so long that no pose near by can be the true one
 };
 
 /// The state machine of design.md 5.9: waiting, initialising, tracking, degraded, lost; each with a reason.
@@ -47,7 +50,7 @@ class HealthMonitor {
   HealthConfig config_;
   Health state_ = Health::waiting;
   TimeNs started_ = 0, last_accepted_ = 0;
-  bool any_accepted_ = false;
+  bool any_accepted_ = false, contradicted_ = false, hopeless_ = false;
 };
 
 }  // namespace evpose

@@ -63,6 +63,37 @@ TEST_F(HealthLaws, GrowingCovarianceDegradesThenLoses) {
   EXPECT_NE(reason_.find("no map point in view"), std::string::npos);
 }
 
+TEST_F(HealthLaws, APoseThatIsNotVerifiedIsNotTracked) {
+  Evidence evidence{t_, true, "", false, 0.1, "", "", false};
+  for (int i = 0; i < 20; ++i) {
+    evidence.t += 10 * kNsPerMs;
+    EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::initialising);
+  }
+  evidence.verified = true;
+  EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::tracking);
+}
+
+TEST_F(HealthLaws, AContradictedPoseIsDegradedThenLostWithAReasonEach) {
+  for (int i = 0; i < 10; ++i) step(true);
+  Evidence evidence{t_, true, "", false, 0.1, "", "", true, "not in this map"};
+  EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::degraded);
+  EXPECT_EQ(reason_, "not in this map");
+  evidence.hopeless = true;
+  EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::lost);
+  EXPECT_EQ(reason_, "not in this map");
+  EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::lost);
+  EXPECT_TRUE(reason_.empty());
+}
+
+TEST_F(HealthLaws, ASearchThatBecomesHopelessSaysSo) {
+  Evidence evidence{t_, false, "searching for the pose", true, 0.1, "", ""};
+  EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::initialising);
+  evidence.hopeless = true;
+  evidence.contradicted = "not in this map";
+  EXPECT_EQ(monitor_.judge(evidence, &reason_), Health::lost);
+  EXPECT_EQ(reason_, "not in this map");
+}
+
 TEST_F(HealthLaws, NotANumberIsLost) { EXPECT_EQ(step(true, std::nan("")), Health::lost); }
 
 TEST_F(HealthLaws, WithoutAnyRegistrationItKeepsInitialising) {

@@ -19,11 +19,15 @@ constexpr double kPriorSigma_m_s = 0.3;                         // of its veloci
 constexpr int kVelocityKnownAfter = 3;                          // slices
 // Points: each is projected twelve times in each interval, so that there are fewer than in tracking.
 constexpr double kPointStride_px = 6;
-constexpr int kPoints = 1500;
+constexpr int kPoints = 1000;
+constexpr double kPointMargin_px = 60, kPointRefresh_px = 48;  // hypotheses near each other share them
+constexpr std::size_t kGatesWhenKnown = 2;  // the narrowest ones, once the velocity is known
 
 VisibleSetConfig points_to_refine(VisibleSetConfig config) {
   config.stride_px = kPointStride_px;
   config.budget = kPoints;
+  config.margin_px = kPointMargin_px;
+  config.refresh_px = kPointRefresh_px;
   return config;
 }
 
@@ -59,15 +63,17 @@ void HypothesisRefiner::refine(PoseHypothesis& h, const Pose& T_body_cam, int sl
   prior_information.segment<3>(3).setConstant(1 / (kPriorSigma_rad * kPriorSigma_rad));
   prior_information.segment<3>(6).setConstant(
       std::pow(slices < kVelocityKnownAfter ? kUnknownVelocitySigma_m_s : kPriorSigma_m_s, -2));
-  for (Registration& registration : registrations_)
+  const std::size_t first = slices < kVelocityKnownAfter ? 0 : registrations_.size() - kGatesWhenKnown;
+  for (std::size_t gate = first; gate < registrations_.size(); ++gate)
     for (int step = 0; step < kStepsPerGate; ++step) {
+      Registration& registration = registrations_[gate];
       Vector9d off;
       off << h.nav.T_map_body.minus(from.T_map_body), h.nav.velocity - from.velocity;
       NormalEquations equations{prior_information.asDiagonal(), -prior_information.cwiseProduct(off)};
       add_intervals(registration, view, points, intervals, h, equations);
       const Vector9d d = equations.H.ldlt().solve(equations.b);
       // The last look is at the refined pose: it only measures.
-      const bool last = &registration == &registrations_.back() && step + 1 == kStepsPerGate;
+      const bool last = gate + 1 == registrations_.size() && step + 1 == kStepsPerGate;
       if (!d.allFinite() || last) continue;
       h.nav.T_map_body = h.nav.T_map_body.plus(d.head<6>());
       h.nav.velocity += d.tail<3>();

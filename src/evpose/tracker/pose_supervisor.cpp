@@ -9,6 +9,12 @@ namespace evpose {
 namespace {
 
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
+constexpr double kContradicted_s = 0.05;  // by chance, few contours have events for so long
+constexpr double kHopeless_s = 1;         // without a search
+// A pose that the events contradict is wrong by no one knows what; so much is within reach of most rooms.
+constexpr double kDoubtPosition_m = 1, kDoubtRotation_rad = 0.2;
+constexpr const char* kContradiction =
+    "not in this map, or far from the pose: contours lie where no events are";
 
 }  // namespace
 
@@ -38,12 +44,45 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   set_sigma(error_state::kPhi, Relocalizer::kFoundRotationSigma_rad);
   set_sigma(error_state::kV, Relocalizer::kFoundVelocitySigma_m_s);
   verify_until_ = input.t + from_seconds(Relocalizer::kVerify_s);
+  verifier_.restart();
+  verified_ = false;
+  contradicted_s_ = 0;
   return state;
 }
 
-/// A pose that was found is believed once its events have concentrated at the contours for a while.
+void PoseSupervisor::take_verdict(double span_s) {
+  switch (verifier_.verdict()) {
+    case PoseVerdict::confirmed:
+      verified_ = true;
+      contradicted_s_ = 0;
+      break;
+    case PoseVerdict::refuted:
+      contradicted_s_ += span_s;
+      break;
+    case PoseVerdict::open:
+      break;
+  }
+}
+
+bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }
+
+bool PoseSupervisor::is_hopeless() const {
+  return searching() ? relocalizer_.has_tried_all() : !config_.on && contradicted_s_ > kHopeless_s;
+}
+
+Matrix6d PoseSupervisor::doubt() const {
+  Matrix6d out = Matrix6d::Zero();
+  if (!is_contradicted()) return out;
+  out.diagonal().head<3>().setConstant(kDoubtPosition_m * kDoubtPosition_m);
+  out.diagonal().tail<3>().setConstant(kDoubtRotation_rad * kDoubtRotation_rad);
+  return out;
+}
+
+/// A pose that was found is believed once its events have concentrated at the contours for a while, and are
+/// clearly more there than beside them.
 bool PoseSupervisor::found_pose_is_refuted(TimeNs t, const RegistrationResult& r) const {
-  return verification_is_over(t) && r.gate_concentration < Relocalizer::kLowConcentration;
+  return verification_is_over(t) &&
+         (r.gate_concentration < Relocalizer::kLowConcentration || is_contradicted());
 }
 
 bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) const {
@@ -51,7 +90,7 @@ bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) 
 }
 
 bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const {
-  return !r.consistent || (health == Health::lost && !verifying());
+  return !r.consistent || is_contradicted() || (health == Health::lost && !verifying());
 }
 
 bool PoseSupervisor::search_is_due() const { return config_.on && !searching() && astray_s_ > kPatience_s; }
@@ -72,6 +111,7 @@ void PoseSupervisor::resume_search(TimeNs t, BackEnd& fusion) {
   state.accel_bias = before_search_.accel_bias;
   fusion.start(state);
   relocalizer_.restart_search(t);
+  verifier_.restart();
 }
 
 void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance) {
@@ -80,12 +120,14 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
   around.diagonal().tail<3>().array() += std::pow(config_.rotation_sigma_rad, 2);
   before_search_ = fusion.state();
   relocalizer_.begin_search(t, fusion.state().nav, around);
+  verifier_.restart();
   astray_s_ = 0;
 }
 
 Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::string* reason) {
   const FusionState state = fusion.reported_state();
   const PoseUncertainty uncertainty(state, e.focal_px, e.typical_depth_m);
+  take_verdict(e.span_s);
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
   Evidence evidence;
   evidence.t = e.t;
@@ -96,9 +138,12 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   if (evidence.sigma_px > health_config_.degraded_sigma_px)
     evidence.weakest = uncertainty.weakest_direction();
   evidence.fault = e.fault;
+  evidence.verified = verified_;
+  evidence.hopeless = is_hopeless();
+  if (is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
   const Health health = health_.judge(evidence, reason);
   astray_s_ = is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
-  if (verification_is_over(e.t)) verify_until_ = 0;
+  if (verification_is_over(e.t) && (verified_ || refuted)) verify_until_ = 0;
   if (refuted) resume_search(e.t, fusion);
   if (search_is_due()) begin_search(e.t, fusion, state.pose_covariance());
   return health;

@@ -8,6 +8,7 @@
 #include "evpose/fusion/back_end.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/health.h"
+#include "evpose/tracker/pose_verifier.h"
 #include "evpose/tracker/relocalizer.h"
 
 namespace evpose {
@@ -28,10 +29,11 @@ struct UpdateEvidence {
 class PoseSupervisor {
  public:
   PoseSupervisor(const RelocalizationConfig& relocalization, const HealthConfig& health,
-                 Relocalizer relocalizer)
+                 Relocalizer relocalizer, PoseVerifier verifier)
       : config_(relocalization),
         health_config_(health),
         relocalizer_(std::move(relocalizer)),
+        verifier_(std::move(verifier)),
         health_(health) {}
 
   /// Begins with the fusion's first state; searches for the pose if that is too unsure.
@@ -43,6 +45,11 @@ class PoseSupervisor {
   /// begins anew, once it is found.
   std::optional<FusionState> search(const RelocalizerInput& input, const BackEnd& fusion);
 
+  /// The events since the last update, and the contours where the pose has them.
+  void look(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s) {
+    verifier_.add(events, contours, span_s);
+  }
+
   /// Why the registration is not used; empty if it is.
   std::string refusal(TimeNs t, const RegistrationResult& registration, double innovation) const;
 
@@ -52,12 +59,17 @@ class PoseSupervisor {
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
   }
+  /// What is to be added to the pose's covariance while events contradict the pose.
+  Matrix6d doubt() const;
 
  private:
   bool verifying() const { return verify_until_ != 0; }
   bool verification_is_over(TimeNs t) const { return verifying() && t >= verify_until_; }
   bool found_pose_is_refuted(TimeNs t, const RegistrationResult& registration) const;
   bool pose_is_unconfirmed(TimeNs t, const RegistrationResult& registration) const;
+  void take_verdict(double span_s);
+  bool is_contradicted() const;
+  bool is_hopeless() const;
   bool is_astray(const RegistrationResult& registration, Health health) const;
   bool search_is_due() const;
   void resume_search(TimeNs t, BackEnd& fusion);
@@ -66,10 +78,13 @@ class PoseSupervisor {
   RelocalizationConfig config_;
   HealthConfig health_config_;
   Relocalizer relocalizer_;
+  PoseVerifier verifier_;
   HealthMonitor health_;
   FusionState before_search_;
-  TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
-  double astray_s_ = 0;      ///< for how long the pose has been lost or not consistent with the map
+  TimeNs verify_until_ = 0;    ///< a pose that was found is watched until then; 0: none
+  double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map
+  double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
+  bool verified_ = false;      ///< the events have confirmed the pose since it was given or found
 };
 
 }  // namespace evpose

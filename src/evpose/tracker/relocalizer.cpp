@@ -24,7 +24,9 @@ constexpr double kPointStride_px = 8, kPointMargin_px = 40;
 constexpr int kPoints = 700;
 
 // Hypotheses.
-constexpr std::size_t kRefined = 8;    // best ones, by single events: these take most of the time
+constexpr std::size_t kRefined = 6;    // best ones, by single events: these take most of the time
+constexpr int kSlicesWithEdges = 2;    // then only those that were refined go on, by single events alone
+constexpr double kHopefulShare = 0.5;  // of the best one's support, with which one goes on
 constexpr double kNewestWeight = 0.4;  // of the newest slice in the means
 constexpr double kLeastStep_s = 1e-3;  // shorter ones tell no rate
 constexpr double kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
@@ -82,6 +84,8 @@ void Relocalizer::restart_search(TimeNs t) {
   ++searches_;
 }
 
+bool Relocalizer::has_tried_all() const { return searches_ > kSearchesOfFirstWidth + kMostWidenings; }
+
 /// Before a search: the first ones follow at once, later ones ever more slowly.
 double Relocalizer::pause_s() const {
   return searches_ <= kSearchesOfFirstWidth
@@ -114,9 +118,11 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
   const Eigen::Vector3d rate_cam = motion_.has_imu()
                                        ? Eigen::Vector3d(input.T_body_cam.q.conjugate() * angular_rate_)
                                        : Eigen::Vector3d::Zero();
-  compensate_rotation(slice_.events(), scene_.camera, {rate_cam, input.now_us, age_s},
-                      workspace_->compensated);
-  workspace_->field.build(workspace_->compensated);
+  if (slices_ < kSlicesWithEdges) {
+    compensate_rotation(slice_.events(), scene_.camera, {rate_cam, input.now_us, age_s},
+                        workspace_->compensated);
+    workspace_->field.build(workspace_->compensated);
+  }
   propagate_prior();
   if (slices_ == 0)
     search_around_prior(input.T_body_cam, age_s);
@@ -181,13 +187,17 @@ void Relocalizer::update_hypotheses(const Pose& T_body_cam, double age_s) {
       hypotheses_.begin(), hypotheses_.end(),
       [](const PoseHypothesis& a, const PoseHypothesis& b) { return a.mean_support > b.mean_support; });
   merge_duplicates(hypotheses_);
+  if (slices_ + 1 < kSlicesWithEdges) return;
+  const double least = kHopefulShare * hypotheses_.front().mean_support;
+  std::erase_if(hypotheses_, [&](const PoseHypothesis& h) { return h.mean_support < least; });
+  if (hypotheses_.size() > kRefined) hypotheses_.resize(kRefined);
 }
 
 PoseHypothesis Relocalizer::updated(const PoseHypothesis& predicted, bool refined, const SearchView& view,
                                     double age_s) {
   PoseHypothesis h = predicted;
   if (refined) workspace_->refiner.refine(h, view.T_body_cam, slices_);
-  if (!refined || h.concentration < kLeastConcentration) {
+  if (slices_ < kSlicesWithEdges && (!refined || h.concentration < kLeastConcentration)) {
     // Perhaps the prediction was too far off: begins at the slice's edges instead.
     PoseHypothesis other = corrected_by_edges(predicted, view, age_s);
     if (refined) workspace_->refiner.refine(other, view.T_body_cam, slices_);

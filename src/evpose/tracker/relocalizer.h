@@ -56,6 +56,8 @@ class Relocalizer {
   /// Begins a search around `state`; covariance of its pose as Pose::plus.
   void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance);
   bool searching() const { return searching_; }
+  /// The pose is not where it was searched, at any width of the search.
+  bool has_tried_all() const;
   /// The pose found was wrong: searches again around where the search began.
   void restart_search(TimeNs t);
   /// How the body has moved since the last call of this or process(), while a pose found is verified.

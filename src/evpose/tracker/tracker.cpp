@@ -139,7 +139,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       fusion_(std::move(fusion)),
       supervisor_(config.relocalization, config.health,
                   Relocalizer({index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
-                               config.visible, config.event_registration})),
+                               config.visible, config.event_registration}),
+                  PoseVerifier(setup_.camera->size(), segments_.count)),
       reporter_(std::move(clock)),
       start_t_(start.t),
       last_update_(start.t),
@@ -262,6 +263,7 @@ void Tracker::take_calibration() {
 }
 
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
+  supervisor_.look(preprocessor_.kept(), contours_.samples(), span_s);
   const Matrix6d covariance = fusion_->measured_covariance();
   RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(),
                               covariance};
@@ -309,11 +311,12 @@ void Tracker::fuse(const RegistrationResult& measurement) {
 
 void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement,
                     const std::string& refused) {
-  const Matrix6d covariance = fusion_->reported_state().pose_covariance();
+  Matrix6d covariance = fusion_->reported_state().pose_covariance();
   std::string reason;
   const Health health = supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement),
                                            contours_.typical_depth_m(), setup_.camera->focal_px()},
                                           *fusion_, &reason);
+  covariance += supervisor_.doubt();
   reporter_.add_judgement(health, std::move(reason), covariance);
 }
 

@@ -191,9 +191,23 @@ TEST_F(BadInput, AMirroredMapIsNoticed) {
   for (ContourPoint& p : mirrored.points) p.position.y() = 6 - p.position.y();
   setup_.map = std::make_shared<const ContourMap>(mirrored);
   fly(boxes(), 1.0);
-  EXPECT_TRUE(said("events do not gather at the contours")) << all_reasons();
+  EXPECT_TRUE(said("not in this map")) << all_reasons();
   EXPECT_GT(sigma_m(updates_.back()), 3 * sigma_m(at(0.05)));
   for (const Update& u : updates_) EXPECT_TRUE(u.health != Health::tracking || error_m(u) < 5 * sigma_m(u));
+}
+
+TEST_F(BadInput, TheMapOfAnotherPlaceEndsLostAndIsNeverCalledTracking) {
+  config_.relocalization.on = false;
+  for (const unsigned seed : {4U, 5U}) {
+    setup_.map = std::make_shared<const ContourMap>(boxes(seed));
+    updates_.clear();
+    reasons_.clear();
+    fly(boxes(), 1.5);
+    for (const Update& u : updates_) EXPECT_NE(u.health, Health::tracking) << seed << all_reasons();
+    EXPECT_EQ(updates_.back().health, Health::lost) << seed << all_reasons();
+    EXPECT_TRUE(said("lost: not in this map")) << seed << all_reasons();
+    EXPECT_LT(error_m(at(0.5)), 3 * sigma_m(at(0.5))) << seed;
+  }
 }
 
 TEST_F(BadInput, AFocalLengthThatIsWrongByATwentiethIsNotAGoodPose) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <random>
 
 #include "evpose/core/parallel.h"
@@ -20,13 +21,36 @@ struct StartClass {
   const char* name;
   double position_m, rotation_deg;
 };
-constexpr std::array<StartClass, 3> kClasses{
-    {{"5 cm, 0.5 deg", 0.05, 0.5}, {"10 cm, 2 deg", 0.1, 2}, {"30 cm, 5 deg", 0.3, 5}}};
+constexpr std::array<StartClass, 4> kClasses{{{"5 cm, 0.5 deg", 0.05, 0.5},
+                                              {"10 cm, 2 deg", 0.1, 2},
+                                              {"30 cm, 5 deg", 0.3, 5},
+                                              {"50 cm, 10 deg", 0.5, 10}}};
 
 struct StartOutcome {
-  bool tracking = false;
+  Health health = Health::waiting;
   double error_mm = 0, found_after_s = -1;
+  double search_s = 0;  ///< of the processor
 };
+
+/// What no pose can be found in, or none near the start.
+enum class Wrong : std::uint8_t { another_place, mirrored, start_3_m_off, noise };
+constexpr std::array<const char*, 4> kWrongNames{"map of another place", "mirrored map", "start 3 m off",
+                                                 "white noise for events"};
+constexpr double kWatched_s = 1.5;
+constexpr double kFarStart_m = 3;
+
+struct WrongOutcome {
+  int updates = 0, tracking = 0;
+  int beyond = 0;  ///< updates with a valid pose further off than three of its sigmas in an axis
+  Health at_end = Health::waiting;
+};
+
+/// Time of this thread's processor.
+double processor_s() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
 
 double uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
 
@@ -35,10 +59,10 @@ Eigen::Vector3d direction(std::mt19937& random) {
   return {r * std::cos(a), r * std::sin(a), z};
 }
 
-/// A time at which half a second of the recording is left.
-TimeNs random_begin(const std::vector<TimedPose>& truth, std::mt19937& random) {
+/// A time at which so much of the recording is left, if it is that long.
+TimeNs random_begin(const std::vector<TimedPose>& truth, double left_s, std::mt19937& random) {
   const TimeNs first = truth.front().t + 10 * kNsPerMs;
-  const double slack_s = to_seconds(truth.back().t - first) - kWithin_s - 0.05;
+  const double slack_s = to_seconds(truth.back().t - first) - left_s - 0.05;
   return first + from_seconds(uniform(random) * std::max(1e-3, slack_s));
 }
 
@@ -66,18 +90,21 @@ TrackerConfig unsure_of_start(TrackerConfig config, const StartClass& from) {
 StartOutcome start(const Streams& streams, const StartClass& from, unsigned seed) {
   std::mt19937 random(seed);
   const std::vector<TimedPose>& truth = streams.job.truth;
-  const TimeNs begin = random_begin(truth, random);
+  const TimeNs begin = random_begin(truth, kWithin_s, random);
   const TimeNs end = begin + from_seconds(kWithin_s + 0.01);
   const auto [packets, imu] = excerpt(streams, begin, end);
   const StartState state = wrong_start(truth, begin, from, random);
   StartOutcome out;
-  auto tracker = Tracker::create(streams.job.setup, unsure_of_start(streams.job.config.tracker, from), state);
+  auto tracker = Tracker::create(streams.job.setup, unsure_of_start(streams.job.config.tracker, from), state,
+                                 processor_s);
   if (!tracker) return out;
   (*tracker)->on_update([&](const Update& u) {
     if (u.t > begin + from_seconds(kWithin_s)) return;
-    out.tracking = u.health == Health::tracking || u.health == Health::degraded;
+    out.health = u.health;
+    if (u.points == 0) out.search_s += u.times.predict_s;
+    const bool tracking = u.health == Health::tracking || u.health == Health::degraded;
     out.error_mm = 1e3 * u.T_map_body.minus(start_at(truth, u.t).T_map_body).head<3>().norm();
-    const bool locked = out.tracking && out.error_mm < 1e3 * kLocked_m;
+    const bool locked = tracking && out.error_mm < 1e3 * kLocked_m;
     if (!locked) out.found_after_s = -1;
     if (locked && out.found_after_s < 0) out.found_after_s = to_seconds(u.t - begin);
   });
@@ -96,27 +123,120 @@ std::vector<StartOutcome> start_all(const Streams& streams, const StartClass& fr
   return outcomes;
 }
 
-double median(std::vector<double> v) {
+double percentile(std::vector<double> v, double share) {
   if (v.empty()) return std::nan("");
-  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
+  std::sort(v.begin(), v.end());
+  return v[static_cast<std::size_t>(share * static_cast<double>(v.size() - 1) + 0.5)];
 }
 
 void print_row(const std::string& name, const StartClass& from, const std::vector<StartOutcome>& outcomes) {
-  int locked = 0, wrong = 0;
-  std::vector<double> times, errors;
+  int locked = 0, wrong = 0, degraded = 0;
+  std::vector<double> times, errors, search;
   for (const StartOutcome& o : outcomes) {
+    search.push_back(1e3 * o.search_s);
     if (o.found_after_s >= 0) {
       ++locked;
       times.push_back(o.found_after_s);
       errors.push_back(o.error_mm);
-    } else if (o.tracking) {
-      ++wrong;
+    } else {
+      wrong += o.health == Health::tracking ? 1 : 0;
+      degraded += o.health == Health::degraded ? 1 : 0;
     }
   }
-  std::printf("| %s | %s | %d | %d | %d | %.2f | %.1f |\n", name.c_str(), from.name, locked, wrong,
-              static_cast<int>(outcomes.size()) - locked - wrong, median(times), median(errors));
+  std::printf("| %s | %s | %d | %d | %d | %d | %.2f | %.1f | %.0f | %.0f |\n", name.c_str(), from.name,
+              locked, wrong, degraded, static_cast<int>(outcomes.size()) - locked - wrong - degraded,
+              percentile(times, 0.5), percentile(errors, 0.5), percentile(search, 0.5),
+              percentile(search, 0.95));
   std::fflush(stdout);
+}
+
+ContourMap mirrored(ContourMap map) {
+  const auto mirror = [](Eigen::Vector3f& v) { v.y() = -v.y(); };
+  float low = map.points.front().position.y(), high = low;
+  for (const ContourPoint& p : map.points)
+    low = std::min(low, p.position.y()), high = std::max(high, p.position.y());
+  map.anchor.y() += low + high;  // so that it fills the same room
+  for (ContourPoint& p : map.points) {
+    mirror(p.position), mirror(p.normal), mirror(p.tangent), mirror(p.normal_b);
+  }
+  for (Eigen::Vector3f& v : map.occluders.vertices) mirror(v);
+  for (MapPlane& plane : map.planes) mirror(plane.normal);
+  for (MapPolygon& polygon : map.polygons)
+    for (Eigen::Vector3f& v : polygon.vertices) mirror(v);
+  return map;
+}
+
+/// A start from the truth, with what makes it wrong.
+WrongOutcome start_wrong(const Streams& streams, Wrong wrong, std::shared_ptr<const ContourMap> map,
+                         unsigned seed) {
+  std::mt19937 random(seed);
+  const std::vector<TimedPose>& truth = streams.job.truth;
+  const TimeNs begin = random_begin(truth, kWatched_s, random);
+  const TimeNs end = begin + from_seconds(kWatched_s);
+  auto [packets, imu] = excerpt(streams, begin, end);
+  StartState state = start_at(truth, begin);
+  if (wrong == Wrong::start_3_m_off) state.T_map_body.p += kFarStart_m * direction(random);
+  TrackerSetup setup = streams.job.setup;
+  if (map) setup.map = std::move(map);
+  if (wrong == Wrong::noise)
+    for (EventPacket& packet : packets)
+      for (Event& e : packet.events)
+        e = make_event(e.dt_us, static_cast<int>(uniform(random) * setup.camera->size().width),
+                       static_cast<int>(uniform(random) * setup.camera->size().height), e.on);
+  WrongOutcome out;
+  auto tracker = Tracker::create(setup, streams.job.config.tracker, state);
+  if (!tracker) return out;
+  (*tracker)->on_update([&](const Update& u) {
+    ++out.updates;
+    out.at_end = u.health;
+    out.tracking += u.health == Health::tracking ? 1 : 0;
+    if (u.health == Health::waiting || u.health == Health::lost) return;
+    const Vector6d e = u.T_map_body.minus(start_at(truth, u.t).T_map_body);
+    const Vector6d sigma = u.covariance.diagonal().cwiseSqrt();
+    out.beyond += (e.cwiseAbs().array() > 3 * sigma.array()).any() ? 1 : 0;
+  });
+  feed(packets, imu, **tracker);
+  (*tracker)->events_complete_until(end);
+  return out;
+}
+
+/// Null if the map stays, or if there is none of another place.
+std::shared_ptr<const ContourMap> wrong_map(Wrong wrong, const Streams& streams,
+                                            const std::vector<Streams>& all) {
+  if (wrong == Wrong::mirrored) return std::make_shared<const ContourMap>(mirrored(*streams.job.setup.map));
+  if (wrong != Wrong::another_place) return nullptr;
+  const auto other = std::find_if(all.begin(), all.end(), [&](const Streams& s) {
+    return s.job.setup.map->points.size() != streams.job.setup.map->points.size();
+  });
+  return other == all.end() ? nullptr : other->job.setup.map;
+}
+
+void print_wrong(const std::string& name, const Streams& streams, const std::vector<Streams>& all,
+                 const RelocalizationRequest& request) {
+  for (const Wrong wrong : {Wrong::another_place, Wrong::mirrored, Wrong::start_3_m_off, Wrong::noise}) {
+    const std::shared_ptr<const ContourMap> map = wrong_map(wrong, streams, all);
+    if (wrong == Wrong::another_place && !map) continue;
+    std::vector<WrongOutcome> outcomes(static_cast<std::size_t>(request.seeds));
+    ThreadPool pool(request.threads);
+    pool.for_chunks(outcomes.size(), 1, [&](std::size_t, std::size_t i, std::size_t) {
+      outcomes[i] = start_wrong(streams, wrong, map, static_cast<unsigned>(1 + i));
+    });
+    int tracking = 0, lost = 0;
+    double updates = 0, called = 0, beyond = 0;
+    for (const WrongOutcome& o : outcomes) {
+      tracking += o.tracking > 0 ? 1 : 0;
+      lost += o.at_end == Health::lost ? 1 : 0;
+      updates += o.updates, called += o.tracking, beyond += o.beyond;
+    }
+    std::printf("| %s | %s | %d | %.1f | %.1f | %d |\n", name.c_str(),
+                kWrongNames[static_cast<std::size_t>(wrong)], tracking, 100 * called / std::max(1.0, updates),
+                100 * beyond / std::max(1.0, updates), lost);
+    std::fflush(stdout);
+  }
+}
+
+void print_starts(const std::string& name, const Streams& streams, const RelocalizationRequest& request) {
+  for (const StartClass& from : kClasses) print_row(name, from, start_all(streams, from, request));
 }
 
 }  // namespace
@@ -126,12 +246,7 @@ Status print_relocalization(const RelocalizationRequest& request) {
   if (!config) return config.error();
   const auto recordings = select_recordings(request.selection);
   if (!recordings) return recordings.error();
-  std::printf(
-      "%d starts each, anywhere in the recording, velocity unknown%s. Locked: within %.0f mm after %.1f "
-      "s.\n\n"
-      "| recording | start off by | locked | wrong pose called tracking | not initialised | median s to lock "
-      "| median error mm |\n|---|---|---|---|---|---|---|\n",
-      request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);
+  std::vector<Streams> all;
   for (const BenchRecording& recording : *recordings) {
     auto streams = load_streams(recording, *config);
     if (!streams) return streams.error();
@@ -139,9 +254,22 @@ Status print_relocalization(const RelocalizationRequest& request) {
       streams->imu.clear();
       streams->job.setup.motion = MotionModel::constant_velocity;
     }
-    for (const StartClass& from : kClasses)
-      print_row(recording.name, from, start_all(*streams, from, request));
+    all.push_back(std::move(*streams));
   }
+  std::printf(
+      "%d starts each, anywhere in the recording, velocity unknown%s. Locked: within %.0f mm after %.1f "
+      "s.\n\n"
+      "| recording | start off by | locked | wrong, called tracking | wrong, called degraded | not found | "
+      "median s to lock | median error mm | search ms p50 | p95 "
+      "|\n|---|---|---|---|---|---|---|---|---|---|\n",
+      request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);
+  for (std::size_t i = 0; i < all.size(); ++i) print_starts((*recordings)[i].name, all[i], request);
+  std::printf(
+      "\n%d starts each from the true pose, watched for %.1f s, with what cannot be tracked.\n\n"
+      "| recording | what is wrong | starts ever called tracking | %% of updates called tracking | %% of "
+      "updates with a pose beyond 3 sigma | starts lost at the end |\n|---|---|---|---|---|---|\n",
+      request.seeds, kWatched_s);
+  for (std::size_t i = 0; i < all.size(); ++i) print_wrong((*recordings)[i].name, all[i], all, request);
   return {};
 }
 

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/tracker/pose_verifier.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace evpose {
+namespace {
+
+// Where it is looked. Patches reach over the way of the contour since the last update.
+constexpr std::array<double, 4> kAside_px{-12, -7, 7, 12};
+constexpr std::array<double, 2> kAlong_px{-1.5, 1.5};  // of a sample
+constexpr double kReach_px = 1;                        // events lie so near to their contour
+constexpr std::size_t kEvery = 4;                      // of the samples, others in each update
+
+// For how long it counts.
+constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while little moves
+constexpr float kEnoughWay_px = 2;
+constexpr float kForgotten_px = 1e-2F;
+
+constexpr double kSigma = 2;  // by so much, and by chance, pieces have more events on them than beside
+
+// How much has to be seen, and of it.
+constexpr float kLeastWay_px = 0.25F;  // in the samples that are looked at: by a pixel in all
+constexpr double kFewestPieces = 20, kFewestEvents = 100;
+constexpr double kConfirmedRatio = 1.9, kConfirmedShare = 0.08;
+constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.055;
+
+}  // namespace
+
+PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces)
+    : size_(size),
+      counts_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
+      pieces_(pieces) {}
+
+void PoseVerifier::restart() {
+  for (const std::uint32_t i : seen_) pieces_[i] = {};
+  seen_.clear();
+}
+
+/// Events where the contour was since the last update, had it been moved aside; negative: it leaves the
+/// image.
+int PoseVerifier::events_along(const ContourSample& s, double aside_px, double span_s) const {
+  const Eigen::Vector2d tangent(-s.normal_px.y(), s.normal_px.x());
+  const double back_px = -s.speed_px_s * span_s;
+  const double from = std::min(0.0, back_px) - kReach_px, to = std::max(0.0, back_px) + kReach_px;
+  const int steps = static_cast<int>(std::ceil(to - from));
+  int sum = 0;
+  for (const double along : kAlong_px)
+    for (int i = 0; i <= steps; ++i) {
+      const double across = aside_px + from + (to - from) * i / steps;
+      const Eigen::Vector2d at = s.pixel + across * s.normal_px + along * tangent;
+      if (!size_.contains(at, 1)) return -1;
+      const auto x = static_cast<std::size_t>(at.x() + 0.5), y = static_cast<std::size_t>(at.y() + 0.5);
+      sum += counts_[y * static_cast<std::size_t>(size_.width) + x];
+    }
+  return sum;
+}
+
+void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
+  const int on = events_along(contour, 0, span_s);
+  if (on < 0) return;
+  std::array<float, kDecoys> beside;
+  for (std::size_t k = 0; k < kDecoys; ++k) {
+    beside[k] = static_cast<float>(events_along(contour, kAside_px[k], span_s));
+    if (beside[k] < 0) return;
+  }
+  Piece& piece = pieces_[contour.segment];
+  if (piece.way_px == 0) seen_.push_back(contour.segment);
+  piece.way_px += static_cast<float>(std::abs(contour.speed_px_s) * span_s) + 1e-6F;
+  piece.on += static_cast<float>(on);
+  for (std::size_t k = 0; k < kDecoys; ++k) piece.beside[k] += beside[k];
+}
+
+void PoseVerifier::decay(double span_s) {
+  const auto keep = static_cast<float>(std::exp(-span_s / kMemory_s)),
+             keep_slow = static_cast<float>(std::exp(-span_s / kLongestMemory_s));
+  std::erase_if(seen_, [&](std::uint32_t i) {
+    Piece& piece = pieces_[i];
+    const float share = piece.way_px > kEnoughWay_px ? keep : keep_slow;
+    piece.way_px *= share, piece.on *= share;
+    for (float& b : piece.beside) b *= share;
+    const bool forgotten = piece.way_px < kForgotten_px && piece.on < kForgotten_px;
+    if (forgotten) piece = {};
+    return forgotten;
+  });
+}
+
+void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours,
+                       double span_s) {
+  decay(span_s);
+  const auto count = [&](const FilteredEvent& e) -> std::uint8_t& {
+    return counts_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
+  };
+  for (const FilteredEvent& e : events)
+    if (count(e) < 255) ++count(e);
+  for (std::size_t i = ++updates_ % kEvery; i < contours.size(); i += kEvery) look_at(contours[i], span_s);
+  for (const FilteredEvent& e : events) count(e) = 0;
+}
+
+PoseEvidence PoseVerifier::evidence() const {
+  // Clearly more events here than `there`, which is known from so many places.
+  const auto exceeds = [](double here, double there, double places) {
+    return here - there > kSigma * std::sqrt(here + there / places + 1);
+  };
+  PoseEvidence out;
+  double on = 0, beside = 0, explained = 0, by_chance = 0;
+  for (const std::uint32_t i : seen_) {
+    const Piece& p = pieces_[i];
+    if (p.way_px < kLeastWay_px) continue;
+    const double sum = std::accumulate(p.beside.begin(), p.beside.end(), 0.0);
+    on += p.on;
+    beside += sum / kDecoys;
+    ++out.pieces;
+    explained += exceeds(p.on, sum / kDecoys, kDecoys) ? 1 : 0;
+    for (const double b : p.beside) by_chance += exceeds(b, (sum - b) / (kDecoys - 1), kDecoys - 1) ? 1 : 0;
+  }
+  if (out.pieces < kFewestPieces || on + beside < kFewestEvents) return {};
+  out.explained = (explained - by_chance / kDecoys) / out.pieces;
+  out.ratio = on / std::max(beside, 1.0);
+  return out;
+}
+
+PoseVerdict PoseVerifier::verdict() const {
+  const PoseEvidence e = evidence();
+  if (e.pieces == 0) return PoseVerdict::open;
+  if (e.ratio > kConfirmedRatio || e.explained > kConfirmedShare) return PoseVerdict::confirmed;
+  return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
+}
+
+}  // namespace evpose

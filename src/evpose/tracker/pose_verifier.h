@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "evpose/camera/camera.h"
+#include "evpose/event/event_preprocessor.h"
+#include "evpose/registration/contour_view.h"
+
+namespace evpose {
+
+enum class PoseVerdict : std::uint8_t {
+  open,       ///< too little has been seen, or it could be either
+  confirmed,  ///< the events gather at the contours far beyond chance
+  refuted,    ///< hardly more than chance and fitting put there
+};
+
+/// What the last tenth of a second says of a pose.
+struct PoseEvidence {
+  double pieces = 0;     ///< of contours, that have moved enough to show themselves
+  double explained = 0;  ///< share of these with clearly more events on them than beside, less that by chance
+  double ratio = 0;      ///< events on contours to those beside them
+};
+
+/// Tells a pose that the events confirm from one that only looks so: compares the events on the contours with
+/// those on the same contours moved aside in the image, piece by piece. A wrong pose that has been fitted to
+/// the events has some contours on edges of the image; most are where there is none.
+class PoseVerifier {
+ public:
+  /// `pieces`: number of the map's contrast segments.
+  PoseVerifier(ImageSize size, std::uint32_t pieces);
+
+  /// The pose comes from elsewhere: what was seen does not count any more.
+  void restart();
+  /// One update: the events since the last one, and the contours at its time.
+  void add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s);
+
+  PoseEvidence evidence() const;
+  PoseVerdict verdict() const;
+
+ private:
+  static constexpr std::size_t kDecoys = 4;
+  struct Piece {
+    float way_px = 0;  ///< of the contour across itself
+    float on = 0;      ///< events
+    std::array<float, kDecoys> beside{};
+  };
+  void decay(double span_s);
+  void look_at(const ContourSample& contour, double span_s);
+  int events_along(const ContourSample& contour, double aside_px, double span_s) const;
+
+  ImageSize size_;
+  std::vector<std::uint8_t> counts_;  ///< of this update's events, per pixel
+  std::vector<Piece> pieces_;         ///< with exponential forgetting
+  std::vector<std::uint32_t> seen_;   ///< pieces that something was seen of
+  std::size_t updates_ = 0;
+};
+
+}  // namespace evpose

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/tracker/pose_verifier.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "evpose/tracker/test_flight.h"
+
+namespace evpose {
+namespace {
+
+using test_flight::pose_at;
+
+constexpr double kUpdate_s = 3e-3, kFlight_s = 0.3;
+
+class PoseVerifierLaws : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    camera_ = test_flight::make_flight_camera();
+    world_ = test_flight::boxes();
+    test_flight::EdgeEvents edges(world_, *camera_);
+    for (int i = 0; i * test_flight::EdgeEvents::kStep_s < kFlight_s; ++i)
+      edges.advance(i * test_flight::EdgeEvents::kStep_s, false, events_);
+  }
+
+  /// What is said in the end of the events of world_ if `map` is believed, seen from a pose off the true one.
+  static PoseVerdict verdict(const ContourMap& map, const Vector6d& off, bool silent = false) {
+    const ContourSegments segments = cut_into_segments(map);
+    const Pose T_body_cam = test_flight::camera_on_body();
+    const ContourView view{map, segments, *camera_, T_body_cam, 1e-3};
+    std::vector<std::uint32_t> points(map.points.size());
+    std::iota(points.begin(), points.end(), 0U);
+    std::vector<ContourSample> samples;
+    PoseVerifier verifier(camera_->size(), segments.count);
+    for (double t_s = kUpdate_s; t_s < kFlight_s; t_s += kUpdate_s) {
+      const Eigen::Vector3d rate = test_flight::imu_at(t_s).gyro;
+      project_contours(view, points, {pose_at(t_s).plus(off), test_flight::velocity_at(t_s), rate}, kUpdate_s,
+                       samples);
+      std::erase_if(samples, [](const ContourSample& s) { return !camera_->size().contains(s.pixel); });
+      verifier.add(silent ? std::vector<FilteredEvent>{} : between(t_s - kUpdate_s, t_s), samples, kUpdate_s);
+    }
+    return verifier.verdict();
+  }
+
+ private:
+  static std::vector<FilteredEvent> between(double from_s, double to_s) {
+    std::vector<FilteredEvent> out;
+    for (const test_flight::TimedEvent& e : events_) {
+      if (e.t_s < from_s || e.t_s >= to_s) continue;
+      FilteredEvent f{};
+      f.x = e.event.x;
+      f.y = e.event.y;
+      f.on = e.event.on;
+      out.push_back(f);
+    }
+    return out;
+  }
+
+ protected:
+  inline static std::shared_ptr<const Camera> camera_;
+  inline static ContourMap world_;
+  inline static std::vector<test_flight::TimedEvent> events_;
+};
+
+TEST_F(PoseVerifierLaws, TheTruePoseIsConfirmed) {
+  EXPECT_EQ(verdict(world_, Vector6d::Zero()), PoseVerdict::confirmed);
+}
+
+TEST_F(PoseVerifierLaws, TheMapOfAnotherPlaceIsRefuted) {
+  for (const unsigned seed : {4U, 5U, 6U, 7U})
+    EXPECT_EQ(verdict(test_flight::boxes(seed), Vector6d::Zero()), PoseVerdict::refuted) << seed;
+}
+
+TEST_F(PoseVerifierLaws, AWrongPoseIsRefuted) {
+  Vector6d off = Vector6d::Zero();
+  off.head<3>() << 0.1, -0.15, 0.1;
+  EXPECT_EQ(verdict(world_, off), PoseVerdict::refuted);
+}
+
+TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {
+  EXPECT_EQ(verdict(world_, Vector6d::Zero(), true), PoseVerdict::open);
+}
+
+TEST_F(PoseVerifierLaws, WithoutContoursNothingIsSaid) {
+  ContourMap behind = world_;
+  for (ContourPoint& p : behind.points) p.position.x() -= 20;
+  EXPECT_EQ(verdict(behind, Vector6d::Zero()), PoseVerdict::open);
+}
+
+}  // namespace
+}  // namespace evpose

@@ -22,7 +22,7 @@ class Variant:
 
 
 def everywhere(decay_s):
-    return (*FIELD, "--set", f"temporal_field.decay_min_s={decay_s}", "--set", f"temporal_field.decay_max_s={decay_s}")
+    return (*FIELD, "--set", f"temporal_field.eta_s={decay_s}")
 
 
 VARIANTS = [

@@ -194,6 +194,8 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_variants(*bench, run, "fusion", "Back ends side by side", experiments::back_end_variants());
   add_variants(*bench, run, "ablation", "What each module of the tracker brings",
                experiments::ablation_variants());
+  add_variants(*bench, run, "paper", "From the paper's form to the defaults, one replacement at a time",
+               experiments::paper_variants());
   add_calibration(*bench, run);
   add_calibration_errors(*bench, run);
   add_relocalization(*bench, run);

@@ -25,7 +25,7 @@ std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& co
     case BackEndKind::ekf:
       return std::make_unique<Ekf>(propagator, config, T_body_cam);
     case BackEndKind::graph:
-      return std::make_unique<Graph>(propagator, config.window_s);
+      return std::make_unique<Graph>(propagator, config);
     case BackEndKind::particle:
       return std::make_unique<ParticleFilter>(propagator, config.particles);
   }

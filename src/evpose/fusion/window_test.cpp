@@ -105,6 +105,17 @@ struct MotionCost {
   }
 };
 
+struct MotionPriorCost {
+  const MotionPrior& prior;
+  FusionState start, end;
+  MotionPrior::Matrix9d root;
+  bool operator()(const double* i, const double* j, double* r) const {
+    Eigen::Map<MotionPrior::Vector9d> out(r);
+    out = root * prior.residual(moved(start, i), moved(end, j)).value;
+    return true;
+  }
+};
+
 struct PoseCost {
   FusionState state;
   PoseInformation measurement;
@@ -128,11 +139,14 @@ struct PriorCost {
   }
 };
 
-TEST(Window, MeetsTheCeresReference) {
+TEST(Window, MeetsTheCeresReferenceWithPriorImuAndMeasurements) {
   const Problem p = make_problem(8, 4);
-  const FusionState first = some_state();
+  FusionState first = some_state();
+  first.angular_rate = {0.3, 0.5, 0.7};
+  // As strong as the IMU, so that neither hides the other.
+  const MotionPrior prior(3e-3, 0.05);
   std::vector<FusionState> initial{first};
-  Window window(kGravity);
+  Window window(kGravity, prior);
   window.start(first);
   for (std::size_t i = 0; i < p.motion.size(); ++i) {
     FusionState next = p.motion[i].predict(initial.back(), kGravity);
@@ -151,6 +165,11 @@ TEST(Window, MeetsTheCeresReference) {
     problem.AddResidualBlock(
         new ceres::NumericDiffCostFunction<MotionCost, ceres::CENTRAL, 15, 15, 15>(new MotionCost{
             p.motion[i], initial[i], initial[i + 1], root_information(p.motion[i].covariance())}),
+        nullptr, d[i].data(), d[i + 1].data());
+    const MotionPrior::Matrix9d information = prior.covariance(0.02).inverse();
+    problem.AddResidualBlock(
+        new ceres::NumericDiffCostFunction<MotionPriorCost, ceres::CENTRAL, 9, 15, 15>(new MotionPriorCost{
+            prior, initial[i], initial[i + 1], MotionPrior::Matrix9d(information.llt().matrixU())}),
         nullptr, d[i].data(), d[i + 1].data());
     problem.AddResidualBlock(new ceres::NumericDiffCostFunction<PoseCost, ceres::CENTRAL, 6, 15>(
                                  new PoseCost{initial[i + 1], p.measurements[i], p.measured_at[i]}),
@@ -227,6 +246,30 @@ TEST(Window, MarginalisingEqualsTheBatchOnALinearProblem) {
   EXPECT_LT(difference.cwiseAbs().cwiseQuotient(P.diagonal().cwiseSqrt()).maxCoeff(), 1e-5);
   for (int i : {0, 1, 2, 6, 7, 8, 12, 13, 14})
     EXPECT_NEAR(sliding.newest().covariance(i, i) / P(i, i), 1, 1e-5) << i;
+}
+
+TEST(Window, OnALinearProblemInterTsFusionIsTheBatchsNewestState) {
+  LinearFlight flight(11);
+  const MotionPrior prior(5e-3, 1e-6);
+  Window batch(kGravity, prior), incremental(kGravity, prior);
+  batch.start(LinearFlight::first());
+  incremental.start(LinearFlight::first());
+  for (int k = 1; k <= 40; ++k) {
+    const Preintegration motion = flight.motion();
+    const PoseInformation m = flight.measurement();
+    for (Window* w : {&batch, &incremental}) {
+      FusionState next = motion.predict(w->newest(), kGravity);
+      next.t = k * 5 * kNsPerMs;
+      w->add(motion, next, m, Pose{});
+    }
+    ASSERT_TRUE(incremental.fuse_newest());
+  }
+  ASSERT_TRUE(batch.optimise(3));
+  const Matrix15d P = batch.newest().covariance;
+  const Vector15d difference = incremental.newest().minus(batch.newest());
+  EXPECT_LT(difference.cwiseAbs().cwiseQuotient(P.diagonal().cwiseSqrt()).maxCoeff(), 1e-4);
+  for (int i : {0, 1, 2, 6, 7, 8, 12, 13, 14})
+    EXPECT_NEAR(incremental.newest().covariance(i, i) / P(i, i), 1, 1e-4) << i;
 }
 
 TEST(Window, OnALinearProblemTheNewestStateIsTheKalmanFilters) {

@@ -7,8 +7,13 @@
 namespace evpose {
 namespace {
 
-float decayed(const TimeSurface& surface, int x, int y, std::uint32_t now_us, float rate) {
-  const std::uint32_t last = std::max(surface.last(x, y, Polarity::off), surface.last(x, y, Polarity::on));
+std::uint32_t newest(const TimeSurface& surface, int x, int y, FieldPolarity polarity) {
+  if (polarity == FieldPolarity::off) return surface.last(x, y, Polarity::off);
+  if (polarity == FieldPolarity::on) return surface.last(x, y, Polarity::on);
+  return std::max(surface.last(x, y, Polarity::off), surface.last(x, y, Polarity::on));
+}
+
+float decayed(std::uint32_t last, std::uint32_t now_us, float rate) {
   if (last == 0) return 0;
   const float age = last < now_us ? static_cast<float>(now_us - last) : 0.0F;
   return std::exp(-age * rate);
@@ -30,7 +35,7 @@ void spline_weights(double u, double w[4], double d[4]) {
 }  // namespace
 
 FieldSample sample_field(const TimeSurface& surface, const Eigen::Vector2d& pixel, std::uint32_t now_us,
-                         double decay_us, FieldKernel kernel) {
+                         double decay_us, FieldKernel kernel, FieldPolarity polarity) {
   const double fx = std::floor(pixel.x()), fy = std::floor(pixel.y());
   const int x0 = static_cast<int>(fx), y0 = static_cast<int>(fy);
   const double ux = pixel.x() - fx, uy = pixel.y() - fy;
@@ -46,7 +51,7 @@ FieldSample sample_field(const TimeSurface& surface, const Eigen::Vector2d& pixe
   FieldSample out;
   for (int j = first; j <= last; ++j)
     for (int i = first; i <= last; ++i) {
-      const double t = decayed(surface, x0 + i - 1, y0 + j - 1, now_us, rate);
+      const double t = decayed(newest(surface, x0 + i - 1, y0 + j - 1, polarity), now_us, rate);
       out.value += wx[i] * wy[j] * t;
       out.gradient.x() += dx[i] * wy[j] * t;
       out.gradient.y() += wx[i] * dy[j] * t;

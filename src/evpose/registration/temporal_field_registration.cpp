@@ -75,10 +75,11 @@ void fill(const FieldProblem& problem, double scale, const NormalEquations& norm
 void describe(ConfigTable& table, TemporalFieldConfig& c) {
   table.add("kernel", c.kernel, {{"bilinear", FieldKernel::bilinear}, {"spline", FieldKernel::spline}},
             "field between pixels");
-  table.add("decay_px", c.decay_px, "px",
-            "time constant of the field, as predicted motion across the contour", {0.05, 100});
-  table.add("decay_min_s", c.decay_min_s, "s", "shortest time constant", {1e-4, 10});
-  table.add("decay_max_s", c.decay_max_s, "s", "longest time constant", {1e-4, 10});
+  table.add("eta_s", c.eta_s, "s",
+            "time constant of the field (EV-Pose 4.1); 0: half a pixel of predicted motion, 3 to 30 ms",
+            {0, 10});
+  table.add("learn_contrast", c.learn_contrast,
+            "events tell which side of a contour is brighter; false: the map alone does");
 }
 
 bool evaluate_point(const FieldProblem& problem, FieldKernel kernel, const Pose& T_map_body,
@@ -94,7 +95,8 @@ bool evaluate_point(const FieldProblem& problem, FieldKernel kernel, const Pose&
     if (jacobian != nullptr) jacobian->setZero();
     return false;
   }
-  const FieldSample field = sample_field(problem.surface, *pixel, problem.now_us, point.decay_us, kernel);
+  const FieldSample field =
+      sample_field(problem.surface, *pixel, problem.now_us, point.decay_us, kernel, point.polarity);
   *residual = 1 - field.value;
   if (jacobian != nullptr) {
     const Eigen::RowVector3d A = -field.gradient.transpose() * J_pixel * T_cam_body.rotation();
@@ -147,20 +149,43 @@ void evaluate_information(const FieldProblem& problem, const TemporalFieldConfig
   fill(problem, information_scale(config), accumulate(problem, config, result->T_map_body, pool), result);
 }
 
+double TemporalFieldRegistration::time_constant_us(const ContourSample& s) const {
+  if (config_.eta_s > 0) return 1e6 * config_.eta_s;
+  return 1e6 * std::clamp(config_.decay_px / std::max(std::abs(s.speed_px_s), 1e-9), config_.decay_min_s,
+                          config_.decay_max_s);
+}
+
+/// What came to the contours since the last update, of the predicted polarity and of the other; and what it
+/// tells of their contrast.
+void TemporalFieldRegistration::count_events(const RegistrationProblem& p, RegistrationResult* result) {
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    const ContourSample& s = p.samples[i];
+    const SampleEvents near = events_at(*p.surface, s, p.now_us, p.span_s);
+    const FieldPolarity expected = points_[i].polarity;
+    result->events +=
+        (expected != FieldPolarity::off ? near.on : 0) + (expected != FieldPolarity::on ? near.off : 0);
+    result->wrong_polarity += expected == FieldPolarity::on    ? near.off
+                              : expected == FieldPolarity::off ? near.on
+                                                               : 0;
+    if (!config_.learn_contrast) continue;
+    contrast_.sweep(s.segment, near.swept_px2);
+    const int net = s.normal_side * (s.speed_px_s > 0 ? 1 : -1) * (near.on - near.off);
+    if (net != 0) contrast_.count(s.segment, net);
+  }
+}
+
 RegistrationResult TemporalFieldRegistration::measure(const RegistrationProblem& p) {
   EVPOSE_CHECK(p.surface != nullptr && p.view != nullptr);
+  RegistrationResult result;
   points_.clear();
-  for (const ContourSample& s : p.samples) {
-    const double decay_s =
-        std::clamp(config_.decay_px / std::max(std::abs(s.speed_px_s), 1e-9), config_.decay_min_s,
-                   std::max(config_.decay_min_s, config_.decay_max_s));
-    points_.push_back({p.view->map.position(s.point), 1e6 * decay_s});
-  }
+  for (const ContourSample& s : p.samples)  // the visible points (5.3), with their flow by the state's twist
+    points_.push_back(
+        {p.view->map.position(s.point), time_constant_us(s), predicted_polarity(s, contrast_, polarity_)});
+  count_events(p, &result);
   const Matrix6d prior = p.pose_covariance.ldlt().solve(Matrix6d::Identity());
   const FieldProblem problem{*p.surface,   p.view->camera, p.view->T_body_cam, points_, p.now_us,
                              p.T_map_body, prior};
-  const FieldSolution solution = minimise(problem, config_, pool_);
-  RegistrationResult result;
+  const FieldSolution solution = minimise(problem, config_, pool_);  // eq. (1)
   result.information = solution.information;
   result.vector = solution.vector;
   result.residual = std::sqrt(solution.cost);

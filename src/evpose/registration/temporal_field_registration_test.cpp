@@ -24,21 +24,22 @@ class TemporalFieldLaws : public ::testing::Test {
     // Slanted lines at many depths: the rounding of events to pixels averages out along each.
     for (double s = -1; s <= 1; s += 0.01)
       for (double a : {-0.75, -0.45, 0.1, 0.4, 0.8}) {
-        add_line_point({s, a + 0.3 * s, 2.5 + 1.2 * a}, {1, 0.3, 0});
-        add_line_point({a - 0.4 * s, s, 3 - 1.5 * a}, {-0.4, 1, 0});
+        add_line_point({s, a + 0.3 * s, 2.5 + 1.2 * a}, {1, 0.3, 0}, a < 0.2 ? Polarity::on : Polarity::off);
+        add_line_point({a - 0.4 * s, s, 3 - 1.5 * a}, {-0.4, 1, 0}, a < 0.2 ? Polarity::off : Polarity::on);
       }
     draw_events();
   }
 
-  void add_line_point(const Eigen::Vector3d& x_cam, const Eigen::Vector3d& tangent_cam) {
+  void add_line_point(const Eigen::Vector3d& x_cam, const Eigen::Vector3d& tangent_cam, Polarity polarity) {
     const Pose T_map_cam = truth_ * T_body_cam_;
     Matrix23d J;
     const auto pixel = camera_->project(x_cam, &J);
     if (!pixel || !camera_->size().contains(*pixel, 6)) return;
     const Eigen::Vector2d along = J * tangent_cam;
-    points_.push_back({T_map_cam * x_cam, 5000});
+    points_.push_back({T_map_cam * x_cam, 5000, FieldPolarity::both});
     normals_.push_back(Eigen::Vector2d(-along.y(), along.x()).normalized());
     cam_.push_back(x_cam);
+    polarities_.push_back(polarity);
   }
 
   /// Each contour is a ridge: events now on it, ever older to both sides.
@@ -50,8 +51,7 @@ class TemporalFieldLaws : public ::testing::Test {
           const Eigen::Vector2d at = u + side * ring * normals_[i];
           const int x = static_cast<int>(std::lround(at.x())), y = static_cast<int>(std::lround(at.y()));
           if (x < 0 || y < 0 || x >= 320 || y >= 240) continue;
-          surface_.insert(x, y, i % 2 == 0 ? Polarity::on : Polarity::off,
-                          kNow - static_cast<std::uint32_t>(1500 * ring));
+          surface_.insert(x, y, polarities_[i], kNow - static_cast<std::uint32_t>(1500 * ring));
         }
       }
   }
@@ -70,6 +70,7 @@ class TemporalFieldLaws : public ::testing::Test {
   Pose T_body_cam_, truth_;
   std::vector<FieldPoint> points_;
   std::vector<Eigen::Vector3d> cam_;
+  std::vector<Polarity> polarities_;      ///< of the events of each point
   std::vector<Eigen::Vector2d> normals_;  ///< across the projected lines
   TimeSurface surface_{320, 240};
   static TemporalFieldConfig confident() {
@@ -83,11 +84,12 @@ class TemporalFieldLaws : public ::testing::Test {
   Matrix6d loose_ = 1e-2 * Matrix6d::Identity();
 };
 
-TEST_F(TemporalFieldLaws, JacobianMatchesDifferences) {
+TEST_F(TemporalFieldLaws, JacobianMatchesDifferencesForEveryPolarity) {
   const Pose at = off(truth_);
   const FieldProblem p = problem(at, loose_);
   int compared = 0;
-  for (const auto& point : points_) {
+  for (FieldPoint point : points_) {
+    point.polarity = static_cast<FieldPolarity>(compared % 3);
     double r = 0;
     Vector6d J;
     if (!evaluate_point(p, FieldKernel::spline, at, point, &r, &J)) continue;
@@ -124,12 +126,17 @@ TEST_F(TemporalFieldLaws, FindsThePoseTheEventsWereDrawnFrom) {
 TEST_F(TemporalFieldLaws, BothSolversFindTheSameMinimum) {
   ThreadPool pool(1);
   const Pose predicted = off(truth_);
-  const FieldProblem p = problem(predicted, loose_);
-  const FieldSolution ours = minimise(p, confident(), pool), reference = minimise_with_ceres(p, confident());
-  const Vector6d d = ours.T_map_body.minus(reference.T_map_body);
-  EXPECT_LT(d.head<3>().norm(), 1e-4);
-  EXPECT_LT(d.tail<3>().norm(), 3e-5);
-  EXPECT_LE(ours.cost, reference.cost * 1.0005);
+  for (bool predicted_polarity : {false, true}) {
+    for (std::size_t i = 0; predicted_polarity && i < points_.size(); ++i)
+      points_[i].polarity = polarities_[i] == Polarity::on ? FieldPolarity::on : FieldPolarity::off;
+    const FieldProblem p = problem(predicted, loose_);
+    const FieldSolution ours = minimise(p, confident(), pool),
+                        reference = minimise_with_ceres(p, confident());
+    const Vector6d d = ours.T_map_body.minus(reference.T_map_body);
+    EXPECT_LT(d.head<3>().norm(), 1e-4);
+    EXPECT_LT(d.tail<3>().norm(), 3e-5);
+    EXPECT_LE(ours.cost, reference.cost * 1.0005);
+  }
 }
 
 TEST_F(TemporalFieldLaws, AnyNumberOfThreadsGivesTheSameBits) {
@@ -176,11 +183,16 @@ TEST(TemporalField, DecayAtOneTimeConstantIsOneOverE) {
   }
 }
 
-TEST(TemporalField, NewerPolarityWins) {
+TEST(TemporalField, PolaritiesAreSeparateAndOfBothTheNewerWins) {
   TimeSurface surface(20, 20);
   surface.insert(5, 5, Polarity::on, 1000);
   surface.insert(5, 5, Polarity::off, 2000);
-  EXPECT_NEAR(sample_field(surface, {5, 5}, 3000, 1000, FieldKernel::bilinear).value, std::exp(-1), 1e-6);
+  const auto value = [&](FieldPolarity polarity) {
+    return sample_field(surface, {5, 5}, 3000, 1000, FieldKernel::bilinear, polarity).value;
+  };
+  EXPECT_NEAR(value(FieldPolarity::on), std::exp(-2), 1e-6);
+  EXPECT_NEAR(value(FieldPolarity::off), std::exp(-1), 1e-6);
+  EXPECT_NEAR(value(FieldPolarity::both), std::exp(-1), 1e-6);
 }
 
 TEST(TemporalField, GradientMatchesDifferences) {

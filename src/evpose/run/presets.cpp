@@ -11,14 +11,14 @@ struct Setting {
   const char* value;
 };
 
-/// EV-Pose: temporal distance field with one decay for all points, bilinear between pixels (4.2), registered
-/// by Gauss-Newton on the newest event of either polarity (4.3); noise filter with a constant window (4.1);
-/// motion prior, STPE factors and IMU factors in a graph over a window (5.2).
+/// EV-Pose: visible points on the temporal distance field of the predicted polarity, with one time constant
+/// for all, bilinear between pixels (4.1 to 4.3, 5.1, eq. 1); noise filter with a constant window (4.1);
+/// motion prior, measurements and IMU in a graph over a window (5.2, eq. 2 to 6). Signs of contrast are the
+/// map's where it states them, and learnt where it does not.
 constexpr std::array kPaper{
     Setting{"registration.kind", "temporal_field"},
     Setting{"temporal_field.kernel", "bilinear"},
-    Setting{"temporal_field.decay_min_s", "0.01"},
-    Setting{"temporal_field.decay_max_s", "0.01"},
+    Setting{"temporal_field.eta_s", "0.01"},
     Setting{"events.noise_filter.support_min_s", "0.01"},
     Setting{"events.noise_filter.support_max_s", "0.01"},
     Setting{"fusion.kind", "graph"},

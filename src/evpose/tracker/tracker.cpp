@@ -43,14 +43,20 @@ std::vector<int> contrast_of_segments(const ContourMap& map, const ContourSegmen
   return sum;
 }
 
+/// With the signs of contrast that the map states.
 std::unique_ptr<Registration> make_registration(const TrackerConfig& config, ImageSize size,
                                                 const ContourMap& map, const ContourSegments& segments) {
-  if (config.registration == RegistrationKind::temporal_field)
-    return std::make_unique<TemporalFieldRegistration>(config.temporal_field, config.threads);
-  auto out = std::make_unique<EventRegistration>(size, config.event_registration, segments.count);
+  const EventRegistrationConfig& events = config.event_registration;
   const std::vector<int> contrast = contrast_of_segments(map, segments);
-  for (std::uint32_t i = 0; i < segments.count; ++i) out->seed_contrast(i, contrast[i]);
-  return out;
+  const auto seeded = [&](auto registration) -> std::unique_ptr<Registration> {
+    for (std::uint32_t i = 0; i < segments.count; ++i) registration->seed_contrast(i, contrast[i]);
+    return registration;
+  };
+  if (config.registration == RegistrationKind::events)
+    return seeded(std::make_unique<EventRegistration>(size, events, segments.count));
+  const PolarityConfig polarity{events.polarity, events.buffer_sigma};
+  return seeded(std::make_unique<TemporalFieldRegistration>(config.temporal_field, polarity, segments.count,
+                                                            config.threads));
 }
 
 Status check_start(const ContourMap& map, const StartState& start, double far_m) {

@@ -145,7 +145,7 @@ TEST(Streams, TheStartHasTheVelocityOfTheTruth) {
 }
 
 TEST(Variants, EverySettingIsOneOfTheTracker) {
-  for (const auto* variants : {&back_end_variants(), &ablation_variants()})
+  for (const auto* variants : {&back_end_variants(), &ablation_variants(), &paper_variants()})
     for (const Variant& variant : *variants) {
       const auto config = configure(variant.settings);
       EXPECT_TRUE(config) << variant.name << ": " << (config ? "" : config.error().line());
@@ -153,7 +153,7 @@ TEST(Variants, EverySettingIsOneOfTheTracker) {
 }
 
 TEST(Variants, HaveNamesOfTheirOwn) {
-  for (const auto* variants : {&back_end_variants(), &ablation_variants()}) {
+  for (const auto* variants : {&back_end_variants(), &ablation_variants(), &paper_variants()}) {
     std::set<std::string> names;
     for (const Variant& variant : *variants) EXPECT_TRUE(names.insert(variant.name).second) << variant.name;
   }

@@ -8,6 +8,7 @@
 
 #include "evpose/eval/score.h"
 #include "evpose/io/files/config_yaml.h"
+#include "evpose/run/presets.h"
 
 namespace evpose::experiments {
 namespace {
@@ -38,6 +39,36 @@ const std::vector<Variant> kAblation{
      {"registration.kind=temporal_field", "events.noise_filter.on=false"}},
 };
 
+constexpr const char *kFollowingDecay = "temporal_field.eta_s=0", *kSpline = "temporal_field.kernel=spline",
+                     *kShortestSupport = "events.noise_filter.support_min_s=0.002",
+                     *kLongestSupport = "events.noise_filter.support_max_s=0.03",
+                     *kEventsOnce = "registration.kind=events", *kNoDelay = "registration.edge_delay=false";
+
+const std::vector<Variant> kPaper{
+    {"paper", true, {}, "paper"},
+    {"paper: signs of the map alone", true, {"temporal_field.learn_contrast=false"}, "paper"},
+    {"paper: both polarities everywhere", true, {"registration.polarity=false"}, "paper"},
+    {"paper: no buffer zone", true, {"registration.buffer_sigma=0"}, "paper"},
+    {"paper: eta 30 ms", true, {"temporal_field.eta_s=0.03"}, "paper"},
+    {"paper: STPE alone", false, {"events.noise_filter.on=false", "registration.polarity=false"}, "paper"},
+    {"paper: STPE and early stage", false, {}, "paper"},
+    {"paper: EKF", true, {"fusion.kind=ekf"}, "paper"},
+    {"paper: particle filter", true, {"fusion.kind=particle"}, "paper"},
+    {"1: decay follows the flow", true, {kFollowingDecay}, "paper"},
+    {"2: spline", true, {kFollowingDecay, kSpline}, "paper"},
+    {"3: filter follows the flow",
+     true,
+     {kFollowingDecay, kSpline, kShortestSupport, kLongestSupport},
+     "paper"},
+    {"4: each event once, gate 1.5 px",
+     true,
+     {kShortestSupport, kLongestSupport, kEventsOnce, kNoDelay, "registration.gate_px=1.5"},
+     "paper"},
+    {"5: gate 0.5 px", true, {kShortestSupport, kLongestSupport, kEventsOnce, kNoDelay}, "paper"},
+    {"6: edge delay", true, {kShortestSupport, kLongestSupport, kEventsOnce}, "paper"},
+    {"7: EKF, the defaults", true, {}},
+};
+
 struct Figures {
   Health at_end = Health::waiting;
   TrajectoryScore score;            ///< of the updates
@@ -46,6 +77,8 @@ struct Figures {
   double sideways_mm = 0, tilt_deg = 0;  ///< mean over the last metre of height, of a landing
   int landing = 0;                       ///< updates in it
   double near = 0, wrong_polarity = 0;   ///< events near contours; of these, left out for their polarity
+  double read = 0, kept = 0;             ///< events; of these, passed by the noise filter
+  int tracking = 0;                      ///< updates
 };
 
 /// A recording that ends lower than a metre below its highest point: the height from which on it lands.
@@ -78,6 +111,9 @@ class Gathered {
     out_.fuse_ms.push_back(1e3 * u.times.fuse_s);
     out_.near += u.events_matched + u.wrong_polarity;
     out_.wrong_polarity += u.wrong_polarity;
+    out_.read += u.events_read;
+    out_.kept += u.events_kept;
+    out_.tracking += u.health == Health::tracking;
   }
   void add(const FusionState& s) { fast_poses_.push_back({s.t, s.nav.T_map_body}); }
   void score() {
@@ -107,6 +143,7 @@ Expected<Figures> measure(Streams streams, const Variant& variant,
                           const std::vector<std::string>& assignments) {
   ConfigTable table;
   describe(table, streams.job.config);
+  if (auto ok = apply_preset(table, variant.preset); !ok) return ok.error();
   for (const auto* list : {&variant.settings, &assignments})
     if (auto ok = apply_assignments(table, *list); !ok) return ok.error();
   if (!variant.imu) streams.job.setup.motion = MotionModel::constant_velocity;
@@ -125,15 +162,16 @@ void print_row(const Variant& variant, const Figures& f) {
   const TrajectoryScore& s = f.score;
   const auto relative = [](const std::optional<RelativeError>& e) { return e.value_or(RelativeError{}); };
   std::printf(
-      "| %s | %s | %.2f | %.3f | %.1f | %.3f | %.3f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.2f, %.3f "
-      "| %.1f | %.2f / %.2f | %.2f / %.2f |\n",
-      variant.name, to_string(f.at_end), s.ate_mm.mean, s.are_deg.mean, s.ate_mm.max,
-      relative(s.over_10ms).translation_mm, relative(s.over_10ms).rotation_deg,
+      "| %s | %s | %.1f | %.2f | %.3f | %.1f | %.3f | %.3f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.2f, "
+      "%.3f | %.1f | %.1f | %.2f / %.2f | %.2f / %.2f |\n",
+      variant.name, to_string(f.at_end),
+      100.0 * f.tracking / std::max<double>(1, static_cast<double>(f.latency_ms.size())), s.ate_mm.mean,
+      s.are_deg.mean, s.ate_mm.max, relative(s.over_10ms).translation_mm, relative(s.over_10ms).rotation_deg,
       relative(s.over_100ms).translation_mm, relative(s.over_100ms).rotation_deg,
       s.velocity_rmse_mm_s.value_or(0), s.nees6_mean.value_or(0), s.lag_ms.value_or(0),
       f.jitter_mm.value_or(0), f.sideways_mm / std::max(1, f.landing), f.tilt_deg / std::max(1, f.landing),
-      100 * f.wrong_polarity / std::max(1.0, f.near), share(f.latency_ms, 0.5), share(f.latency_ms, 0.99),
-      share(f.fuse_ms, 0.5), share(f.fuse_ms, 0.99));
+      100 * (1 - f.kept / std::max(1.0, f.read)), 100 * f.wrong_polarity / std::max(1.0, f.near),
+      share(f.latency_ms, 0.5), share(f.latency_ms, 0.99), share(f.fuse_ms, 0.5), share(f.fuse_ms, 0.99));
   std::fflush(stdout);
 }
 
@@ -142,10 +180,12 @@ Status print_recording(const BenchRecording& recording, const std::vector<Varian
   const auto streams = load_streams(recording, RunConfig{});
   if (!streams) return streams.error();
   std::printf(
-      "\n### %s\n\n| variant | at the end | ATE mean mm | ARE mean deg | ATE max mm | RTE 10 ms mm "
+      "\n### %s\n\n| variant | at the end | tracked %% | ATE mean mm | ARE mean deg | ATE max mm | RTE 10 ms "
+      "mm "
       "| RRE 10 ms deg | RTE 100 ms mm | RRE 100 ms deg | velocity mm/s | NEES/6 | lag ms | jitter mm "
-      "| landing: sideways mm, tilt deg | wrong polarity %% | update p50 / p99 ms | fusion p50 / p99 ms |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+      "| landing: sideways mm, tilt deg | noise %% | wrong polarity %% | update p50 / p99 ms | fusion p50 / "
+      "p99 ms |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
       recording.name.c_str());
   for (const Variant& variant : variants) {
     const auto wanted = [&](const std::string& begin) {
@@ -164,6 +204,7 @@ Status print_recording(const BenchRecording& recording, const std::vector<Varian
 
 const std::vector<Variant>& back_end_variants() { return kBackEnds; }
 const std::vector<Variant>& ablation_variants() { return kAblation; }
+const std::vector<Variant>& paper_variants() { return kPaper; }
 
 Status print_variants(const std::vector<Variant>& variants, const VariantsRequest& request) {
   if (!request.own.folder.empty()) return print_recording(request.own, variants, request);

@@ -13,12 +13,15 @@ struct Variant {
   const char* name;
   bool imu;
   std::vector<std::string> settings;
+  const char* preset = "";  ///< that the settings change
 };
 
 /// The back ends side by side.
 const std::vector<Variant>& back_end_variants();
 /// What each module of the tracker brings: all, and each left out.
 const std::vector<Variant>& ablation_variants();
+/// From the paper's form to the defaults, one replacement at a time; and the paper's own comparisons.
+const std::vector<Variant>& paper_variants();
 
 struct VariantsRequest {
   Selection selection;              ///< its assignments come after those of a variant

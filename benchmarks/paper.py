@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared recordings."""
+import experiments
+import tables
+
+OF_MAP = "paper: signs of the map alone"
+QUICK = ["paper: both"]
+# The paper's comparison of its parts and of frameworks.
+PARTS = ["paper: STPE alone", "paper: STPE and early stage", "paper: particle filter", "paper: EKF", "paper"]
+EARLY_STAGE = ["paper", OF_MAP, "paper: both polarities everywhere", "paper: no buffer zone", "paper: eta 30 ms"]
+
+
+def measure(bench, recording):
+    """Rows of `evpose bench paper` by variant. The signs of the map are those that the defaults learn on the same flight:
+    the shared maps state none."""
+    rows = experiments.variants(bench, "paper", recording, *(QUICK if bench.quick else []))
+    if bench.quick:
+        return rows
+
+    def with_signs():
+        with bench.folder() as scratch:
+            learnt = scratch / "learnt.h5"
+            bench.track(recording.folder, recording.contours, scratch / "run", "--occluders", recording.mesh,
+                        "--learn-map", learnt)
+            return bench.run("bench", "paper", "--recording", recording.folder, "--map", learnt, "--occluders",
+                             recording.mesh, "--variant", OF_MAP)
+
+    printed = bench.once(f"paper: {recording.name}, signs of the map", with_signs)
+    (signed,) = tables.read(printed).values()
+    return rows | {OF_MAP: signed[0]}
+
+
+def errors(row):
+    return f"{row['ATE mean mm']}, {row['ARE mean deg']}, {row['tracked %']}"
+
+
+def cost(row):
+    return f"{row['update p50 / p99 ms']}; {row['noise %']}, {row['wrong polarity %']}"
+
+
+def mean(measured, names, column):
+    """Over the recordings, of each variant."""
+    values = {name: [float(rows[name][column]) for rows in measured.values() if name in rows] for name in names}
+    return {name: sum(v) / len(v) for name, v in values.items() if v}
+
+
+def section(measured, names):
+    part = {recording: {n: rows[n] for n in names if n in rows} for recording, rows in measured.items()}
+    if not any(part.values()):
+        return ["-"]
+    ate, are = mean(measured, names, "ATE mean mm"), mean(measured, names, "ARE mean deg")
+    lines = tables.pivot(part, errors)
+    lines[0] += " mean |"
+    lines[1] += "---|"
+    for i, line in enumerate(lines[2:], 2):
+        name = tables.cells_of(line)[0]
+        lines[i] += f" {ate[name]:.2f}, {are[name]:.3f} |"
+    return ["Mean ATE mm, mean ARE deg, % of updates called `tracking`:", "", *lines, "",
+            "Update ms p50 / p99; % of events that the noise filter drops, % of those at contours left out for polarity:", "",
+            *tables.pivot(part, cost)]
+
+
+def make(bench):
+    measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
+    names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
+    steps = ["paper", *(name for name in names if name[0].isdigit())]
+    return bench.write_page("paper", {"steps": section(measured, steps), "parts": section(measured, PARTS),
+                                      "early stage": section(measured, EARLY_STAGE)})

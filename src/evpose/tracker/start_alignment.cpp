@@ -6,6 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <utility>
 
 #include "evpose/registration/edge_field.h"
 #include "evpose/registration/pose_search.h"
@@ -28,6 +32,10 @@ constexpr double kHighConcentration = 0.38;
 // With less, most starting points have to lead to one view, and its contours have to have events.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2;         // sigma
+double env(const char* n, double d) { const char* v = std::getenv(n); return v ? std::atof(v) : d; }
+const double kConfirmedWithin = env("CONF", 4), kFewAgree = env("FEW", 0.4);
+const int kDraws = static_cast<int>(env("DRAWS", 10));
+constexpr unsigned kSeed = 1;
 constexpr double kEdge_m = 0.6;         // an edge whose events share errors
 constexpr double kEdgeSigma_px = 0.15;  // of such an error; one degree of freedom
 
@@ -214,20 +222,20 @@ void StartAlignment::look(const SeenPrior& prior, const Pose& T_body_cam,
 }
 
 /// From a pose, the other states as the prior has them. The camera's numbers are held above a gate.
-StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Pose& from, const Pose& T_body_cam,
+StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Begin& begin, const Pose& T_body_cam,
                                              double numbers_below_px) {
   const Eigen::Index n = prior.numbers.size(), all = 9 + n;
   const Eigen::MatrixXd information = information_of(prior.covariance);
   Trial trial;
   trial.nav = prior.nav;
-  trial.nav.T_map_body = from;
-  trial.numbers = prior.numbers;
+  trial.nav.T_map_body = begin.T_map_body;
+  trial.numbers = begin.numbers;
   trial.H.resize(all, all);
   trial.b.resize(all);
   trial.moved.resize(all);
   const Camera& choosing = adjusted_ != nullptr ? adjusted_->given() : camera_;
   VisibleSet visible(index_, choosing, points_to_refine(visible_config_));
-  const std::vector<std::uint32_t> points = visible.choose(from * T_body_cam);
+  const std::vector<std::uint32_t> points = visible.choose(begin.T_map_body * T_body_cam);
   for (const double gate_px : kGates_px) {
     EventRegistration registration(camera_.size(), under_gate(registration_config_, gate_px),
                                    segments_.count);
@@ -260,7 +268,7 @@ SeenMeasurement StartAlignment::without_velocity(const SeenPrior& prior, const T
 }
 
 /// Share of the trials that led to the same view.
-double StartAlignment::agreement(const std::vector<Trial>& trials, const Trial& view) {
+double StartAlignment::agreement(std::span<const Trial> trials, const Trial& view) {
   const auto agree = std::ranges::count_if(trials, [&](const Trial& other) {
     const Eigen::VectorXd d = other.moved - view.moved;
     return d.dot(view.H * d) < kSameView * kSameView * static_cast<double>(d.size());
@@ -268,19 +276,52 @@ double StartAlignment::agreement(const std::vector<Trial>& trials, const Trial& 
   return static_cast<double>(agree) / static_cast<double>(trials.size());
 }
 
-std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {
+/// From the poses that the edges suggest with the given numbers, and from drawn ones.
+std::vector<StartAlignment::Trial> StartAlignment::try_all(const SeenPrior& prior, const Pose& T_body_cam) {
   std::vector<Trial> trials;
-  for (const Pose& from : first_guesses(prior, T_body_cam))
+  const std::vector<Pose> guesses = first_guesses(prior, T_body_cam);
+  for (const Pose& from : guesses)
     for (const double numbers_below_px : {kNumbersFirst_px, kPoseFirst_px}) {
       if (numbers_below_px == kPoseFirst_px && prior.numbers.size() == 0) continue;
-      trials.push_back(anneal(prior, from, T_body_cam, numbers_below_px));
+      trials.push_back(anneal(prior, {from, prior.numbers}, T_body_cam, numbers_below_px));
     }
+  if (prior.numbers.size() == 0) return trials;
+  std::mt19937 random(kSeed);
+  std::normal_distribution<double> normal;
+  const Eigen::MatrixXd root = information_of(prior.covariance).inverse().llt().matrixL();
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd off =
+        root * Eigen::VectorXd::NullaryExpr(root.rows(), [&] { return normal(random); });
+    const Pose from = draw % 2 == 0 ? prior.nav.T_map_body.plus(off.head<6>())
+                                    : guesses[static_cast<std::size_t>(draw) % guesses.size()];
+    trials.push_back(anneal(prior, {from, prior.numbers + off.tail(prior.numbers.size())}, T_body_cam, kNumbersFirst_px));
+  }
+  return trials;
+}
+
+/// Whether this view is the one that the last call found. That began from the same prior, but for what the
+/// IMU has added since.
+bool StartAlignment::confirms_last(const Trial& view) {
+  const Eigen::VectorXd last = std::exchange(last_moved_, view.moved);
+  if (last.size() != view.moved.size()) return false;
+  Eigen::VectorXd d = view.moved - last;
+  d.segment<3>(6).setZero();
+  return d.dot(view.H * d) < kConfirmedWithin * kConfirmedWithin * static_cast<double>(d.size());
+}
+
+std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {
+  const std::vector<Trial> trials = try_all(prior, T_body_cam);
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);
   intervals_.clear();
   const Trial& best = *std::ranges::max_element(trials, {}, &Trial::support);
+  const std::size_t drawn = prior.numbers.size() > 0 ? static_cast<std::size_t>(kDraws) : 0;
+  const double agreeing = agreement(std::span(trials).first(trials.size() - drawn), best);
   const bool agreed = best.concentration >= kLeastConcentration && best.support >= kLeastSupport &&
-                      agreement(trials, best) >= kLeastAgreement;
-  if (!agreed && best.concentration < kHighConcentration) return {};
+                      agreeing >= kLeastAgreement;
+  const bool confirmed = confirms_last(best);
+  if (std::getenv("SAY")) std::fprintf(stderr, "SAY conc %.3f supp %.3f agree %.2f confirmed %d\n", best.concentration, best.support, agreeing, confirmed);
+  const bool high = best.concentration >= kHighConcentration && (confirmed || agreeing >= kFewAgree);
+  if (!agreed && !high) return {};
   return without_velocity(prior, best);
 }
 

@@ -57,6 +57,10 @@ class StartAlignment {
  private:
   static constexpr double kDuration_s = 0.04;
 
+  struct Begin {
+    Pose T_map_body;
+    AdjustedCamera::Correction numbers;
+  };
   /// One begin of the iteration, and where it led.
   struct Trial {
     NavState nav;
@@ -73,14 +77,16 @@ class StartAlignment {
     double weight = 0, offset = 0;
   };
   std::vector<Pose> first_guesses(const SeenPrior& prior, const Pose& T_body_cam) const;
-  Trial anneal(const SeenPrior& prior, const Pose& from, const Pose& T_body_cam, double numbers_below_px);
+  std::vector<Trial> try_all(const SeenPrior& prior, const Pose& T_body_cam);
+  Trial anneal(const SeenPrior& prior, const Begin& begin, const Pose& T_body_cam, double numbers_below_px);
+  bool confirms_last(const Trial& view);
   void look(const SeenPrior& prior, const Pose& T_body_cam, std::span<const std::uint32_t> points,
             EventRegistration& registration, Trial& trial);
   void add_offsets(const EventRegistration& registration, const Pose& T_cam_map,
                    const Eigen::Matrix<double, 6, 9>& by_state, std::map<std::uint32_t, EdgeSum>& edges,
                    Trial& trial) const;
   void add_edges(const std::map<std::uint32_t, EdgeSum>& edges, Trial& trial) const;
-  static double agreement(const std::vector<Trial>& trials, const Trial& view);
+  static double agreement(std::span<const Trial> trials, const Trial& view);
   SeenMeasurement without_velocity(const SeenPrior& prior, const Trial& trial) const;
 
   HypothesisMotion motion_;
@@ -94,6 +100,7 @@ class StartAlignment {
   std::vector<std::int8_t> side_;  ///< of each map point: +1 or -1, which way an error of its edge counts
   EventIntervals intervals_;
   std::vector<ContourSample> samples_;
+  Eigen::VectorXd last_moved_;  ///< of the view that the last call found; empty: there was none
 };
 
 }  // namespace evpose

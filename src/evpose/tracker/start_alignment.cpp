@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
+#include <utility>
 
 #include "evpose/registration/edge_field.h"
 #include "evpose/registration/pose_search.h"
@@ -23,11 +25,14 @@ constexpr double kNumbersFirst_px = 10;    // gates below which the camera's num
 constexpr double kPoseFirst_px = 1.7;      // or the narrow ones
 constexpr double kHeld = 1e12;             // factor on the prior's information that holds the numbers
 // Chance gives no concentration at all, a wrong view some. How much the right one gives depends on the
-// texture beside the contours. So much is the right one's:
-constexpr double kHighConcentration = 0.38;
+// texture beside the contours. So much is the right one's, if several starting points or the next events lead
+// to it as well:
+constexpr double kHighConcentration = 0.42, kFewAgree = 0.4;
 // With less, most starting points have to lead to one view, and its contours have to have events.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
-constexpr double kSameView = 2;         // sigma
+constexpr double kSameView = 2, kConfirmedWithin = 4;  // sigma
+constexpr int kDraws = 10;                             // further starting points where these do not agree
+constexpr unsigned kSeed = 1;
 constexpr double kEdge_m = 0.6;         // an edge whose events share errors
 constexpr double kEdgeSigma_px = 0.15;  // of such an error; one degree of freedom
 
@@ -214,20 +219,20 @@ void StartAlignment::look(const SeenPrior& prior, const Pose& T_body_cam,
 }
 
 /// From a pose, the other states as the prior has them. The camera's numbers are held above a gate.
-StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Pose& from, const Pose& T_body_cam,
-                                             double numbers_below_px) {
+StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Begin& begin,
+                                             const Pose& T_body_cam, double numbers_below_px) {
   const Eigen::Index n = prior.numbers.size(), all = 9 + n;
   const Eigen::MatrixXd information = information_of(prior.covariance);
   Trial trial;
   trial.nav = prior.nav;
-  trial.nav.T_map_body = from;
-  trial.numbers = prior.numbers;
+  trial.nav.T_map_body = begin.T_map_body;
+  trial.numbers = begin.numbers;
   trial.H.resize(all, all);
   trial.b.resize(all);
   trial.moved.resize(all);
   const Camera& choosing = adjusted_ != nullptr ? adjusted_->given() : camera_;
   VisibleSet visible(index_, choosing, points_to_refine(visible_config_));
-  const std::vector<std::uint32_t> points = visible.choose(from * T_body_cam);
+  const std::vector<std::uint32_t> points = visible.choose(begin.T_map_body * T_body_cam);
   for (const double gate_px : kGates_px) {
     EventRegistration registration(camera_.size(), under_gate(registration_config_, gate_px),
                                    segments_.count);
@@ -260,7 +265,7 @@ SeenMeasurement StartAlignment::without_velocity(const SeenPrior& prior, const T
 }
 
 /// Share of the trials that led to the same view.
-double StartAlignment::agreement(const std::vector<Trial>& trials, const Trial& view) {
+double StartAlignment::agreement(std::span<const Trial> trials, const Trial& view) {
   const auto agree = std::ranges::count_if(trials, [&](const Trial& other) {
     const Eigen::VectorXd d = other.moved - view.moved;
     return d.dot(view.H * d) < kSameView * kSameView * static_cast<double>(d.size());
@@ -268,20 +273,67 @@ double StartAlignment::agreement(const std::vector<Trial>& trials, const Trial& 
   return static_cast<double>(agree) / static_cast<double>(trials.size());
 }
 
-std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {
+/// From the poses that the edges suggest.
+std::vector<StartAlignment::Trial> StartAlignment::try_guesses(const SeenPrior& prior,
+                                                               std::span<const Pose> guesses,
+                                                               const Pose& T_body_cam) {
   std::vector<Trial> trials;
-  for (const Pose& from : first_guesses(prior, T_body_cam))
+  for (const Pose& from : guesses)
     for (const double numbers_below_px : {kNumbersFirst_px, kPoseFirst_px}) {
       if (numbers_below_px == kPoseFirst_px && prior.numbers.size() == 0) continue;
-      trials.push_back(anneal(prior, from, T_body_cam, numbers_below_px));
+      trials.push_back(anneal(prior, {from, prior.numbers}, T_body_cam, numbers_below_px));
     }
+  return trials;
+}
+
+/// From numbers and poses that are drawn from the prior, and from drawn numbers and the suggested poses.
+void StartAlignment::try_drawn(const SeenPrior& prior, std::span<const Pose> guesses, const Pose& T_body_cam,
+                               std::vector<Trial>& trials) {
+  std::mt19937 random(kSeed);
+  std::normal_distribution<double> normal;
+  const Eigen::Index n = prior.numbers.size();
+  const Eigen::MatrixXd root = information_of(prior.covariance).inverse().llt().matrixL();
+  for (std::size_t draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd off =
+        root * Eigen::VectorXd::NullaryExpr(root.rows(), [&] { return normal(random); });
+    const Pose from =
+        draw % 2 == 0 ? prior.nav.T_map_body.plus(off.head<6>()) : guesses[draw % guesses.size()];
+    trials.push_back(anneal(prior, {from, prior.numbers + off.tail(n)}, T_body_cam, kNumbersFirst_px));
+  }
+}
+
+/// Whether this view is the one that the last call found. That began from the same prior, but for what the
+/// IMU has added since.
+bool StartAlignment::confirms_last(const Trial& view) {
+  const Eigen::VectorXd last = std::exchange(last_moved_, view.moved);
+  if (last.size() != view.moved.size()) return false;
+  Eigen::VectorXd d = view.moved - last;
+  d.segment<3>(6).setZero();
+  return d.dot(view.H * d) < kConfirmedWithin * kConfirmedWithin * static_cast<double>(d.size());
+}
+
+/// `agreeing`: share of the starting points that the prior suggests.
+bool StartAlignment::is_right(const Trial& view, double agreeing, bool confirmed) {
+  if (view.concentration >= kHighConcentration && (confirmed || agreeing >= kFewAgree)) return true;
+  return view.concentration >= kLeastConcentration && view.support >= kLeastSupport &&
+         agreeing >= kLeastAgreement;
+}
+
+std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {
+  const std::vector<Pose> guesses = first_guesses(prior, T_body_cam);
+  std::vector<Trial> trials = try_guesses(prior, guesses, T_body_cam);
+  const std::size_t suggested = trials.size();
+  const auto best = [&] { return std::ranges::max_element(trials, {}, &Trial::support); };
+  const auto agreeing = [&] { return agreement(std::span(trials).first(suggested), *best()); };
+  bool right = agreeing() >= kLeastAgreement && is_right(*best(), agreeing(), false);
+  if (!right) {
+    try_drawn(prior, guesses, T_body_cam, trials);
+    right = is_right(*best(), agreeing(), confirms_last(*best()));
+  }
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);
   intervals_.clear();
-  const Trial& best = *std::ranges::max_element(trials, {}, &Trial::support);
-  const bool agreed = best.concentration >= kLeastConcentration && best.support >= kLeastSupport &&
-                      agreement(trials, best) >= kLeastAgreement;
-  if (!agreed && best.concentration < kHighConcentration) return {};
-  return without_velocity(prior, best);
+  if (!right) return {};
+  return without_velocity(prior, *best());
 }
 
 }  // namespace evpose

@@ -29,9 +29,10 @@ struct SeenPrior {
 /// again, at their own times and under gates that close from several pixels to the tracker's (graduated
 /// non-convexity), for the pose, the velocity and the camera's numbers together. This begins at several poses
 /// (search_pose()), once with the numbers free and once with the pose alone at first; what gathers most
-/// events at the contours is taken, if they are many or most starting points lead there. Errors that the
-/// events of one edge share are eliminated with a variance of their own for each edge (Student-t), so that
-/// the covariance is one that single disturbed edges do not mislead.
+/// events at the contours is taken, if most starting points lead there, or the events are many and some do.
+/// Else it begins at draws from the prior, too, and the events that follow may confirm the view. Errors that
+/// the events of one edge share are eliminated with a variance of their own for each edge (Student-t), so
+/// that the covariance is one that single disturbed edges do not mislead.
 class StartAlignment {
  public:
   /// Worth its time where contours are expected to lie further off than this, px (root mean square).
@@ -57,6 +58,10 @@ class StartAlignment {
  private:
   static constexpr double kDuration_s = 0.04;
 
+  struct Begin {
+    Pose T_map_body;
+    AdjustedCamera::Correction numbers;
+  };
   /// One begin of the iteration, and where it led.
   struct Trial {
     NavState nav;
@@ -73,14 +78,20 @@ class StartAlignment {
     double weight = 0, offset = 0;
   };
   std::vector<Pose> first_guesses(const SeenPrior& prior, const Pose& T_body_cam) const;
-  Trial anneal(const SeenPrior& prior, const Pose& from, const Pose& T_body_cam, double numbers_below_px);
+  std::vector<Trial> try_guesses(const SeenPrior& prior, std::span<const Pose> guesses,
+                                 const Pose& T_body_cam);
+  void try_drawn(const SeenPrior& prior, std::span<const Pose> guesses, const Pose& T_body_cam,
+                 std::vector<Trial>& trials);
+  Trial anneal(const SeenPrior& prior, const Begin& begin, const Pose& T_body_cam, double numbers_below_px);
+  bool confirms_last(const Trial& view);
+  static bool is_right(const Trial& view, double agreeing, bool confirmed);
   void look(const SeenPrior& prior, const Pose& T_body_cam, std::span<const std::uint32_t> points,
             EventRegistration& registration, Trial& trial);
   void add_offsets(const EventRegistration& registration, const Pose& T_cam_map,
                    const Eigen::Matrix<double, 6, 9>& by_state, std::map<std::uint32_t, EdgeSum>& edges,
                    Trial& trial) const;
   void add_edges(const std::map<std::uint32_t, EdgeSum>& edges, Trial& trial) const;
-  static double agreement(const std::vector<Trial>& trials, const Trial& view);
+  static double agreement(std::span<const Trial> trials, const Trial& view);
   SeenMeasurement without_velocity(const SeenPrior& prior, const Trial& trial) const;
 
   HypothesisMotion motion_;
@@ -94,6 +105,7 @@ class StartAlignment {
   std::vector<std::int8_t> side_;  ///< of each map point: +1 or -1, which way an error of its edge counts
   EventIntervals intervals_;
   std::vector<ContourSample> samples_;
+  Eigen::VectorXd last_moved_;  ///< of the view that the last call found; empty: there was none
 };
 
 }  // namespace evpose

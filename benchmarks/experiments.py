@@ -75,7 +75,7 @@ def draw_ablation(path, measured):
     svg.write(path)
 
 
-LOCKING = ["locked", "wrong, called tracking", "wrong, called degraded", "not found", "median s to lock", "median error mm",
+LOCKING = ["locked", "wrong called tracking", "wrong called degraded", "not found", "median s to lock", "median error mm",
            "search ms p50", "p95"]
 
 

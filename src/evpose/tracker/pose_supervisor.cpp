@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/tracker/pose_supervisor.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "evpose/tracker/pose_uncertainty.h"
@@ -11,8 +12,8 @@ namespace {
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
 constexpr double kContradicted_s = 0.05;  // by chance, few contours have events for so long
 constexpr double kHopeless_s = 1;         // without a search
-// A pose that the events contradict is wrong by no one knows what; so much is within reach of most rooms.
-constexpr double kDoubtPosition_m = 1, kDoubtRotation_rad = 0.2;
+// A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
+constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
 constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
 
@@ -72,7 +73,7 @@ bool PoseSupervisor::is_hopeless() const {
 
 Matrix6d PoseSupervisor::doubt() const {
   Matrix6d out = Matrix6d::Zero();
-  if (!is_contradicted()) return out;
+  if (!is_contradicted() && (verified_ || !verifying())) return out;
   out.diagonal().head<3>().setConstant(kDoubtPosition_m * kDoubtPosition_m);
   out.diagonal().tail<3>().setConstant(kDoubtRotation_rad * kDoubtRotation_rad);
   return out;
@@ -112,6 +113,7 @@ void PoseSupervisor::resume_search(TimeNs t, BackEnd& fusion) {
   fusion.start(state);
   relocalizer_.restart_search(t);
   verifier_.restart();
+  contradicted_s_ = std::max(contradicted_s_, 2 * kContradicted_s);
 }
 
 void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance) {

@@ -59,7 +59,8 @@ class PoseSupervisor {
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
   }
-  /// What is to be added to the pose's covariance while events contradict the pose.
+  /// What is to be added to the pose's covariance while events contradict the pose, or while one that was
+  /// found is not verified.
   Matrix6d doubt() const;
 
  private:

@@ -259,7 +259,7 @@ Status print_relocalization(const RelocalizationRequest& request) {
   std::printf(
       "%d starts each, anywhere in the recording, velocity unknown%s. Locked: within %.0f mm after %.1f "
       "s.\n\n"
-      "| recording | start off by | locked | wrong, called tracking | wrong, called degraded | not found | "
+      "| recording | start off by | locked | wrong called tracking | wrong called degraded | not found | "
       "median s to lock | median error mm | search ms p50 | p95 "
       "|\n|---|---|---|---|---|---|---|---|---|---|\n",
       request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/latency.md: where the time of an update goes, on one core; for a machine that does nothing else.
 
-What passes between the newest event and the pose, by stage, with the share of a core and the peak of memory.
+What passes between the newest event and the pose, by stage, with the share of a core and the peak of memory; and the
+same at high rates of events (`evpose bench realtime`).
 """
 import csv
 
@@ -9,7 +10,9 @@ import harness
 import tables
 
 RUNS = [("room_spiral", 300), ("room_spiral", 1000), ("room_720p", 300), ("room_720p", 1000)]
-STAGES = ["predict", "choose", "register", "fuse"]
+STAGES = ["predict", "register", "fuse"]  # after the newest event
+BEFORE = ["choose", "events"]
+REALTIME = {"room_720p": [1, 20]}  # million events a second
 
 
 def at(values, share):
@@ -27,13 +30,27 @@ def measure(bench, recording, rate_hz):
     total = [sum(times) for times in zip(*stages)]
     resources = summary["resources"]
     return [recording.name, rate_hz, *(f"{at(s, 0.5):.2f} / {at(s, 0.99):.2f}" for s in [*stages, total]),
-            f"{at([u['events_ms'] for u in updates], 0.5):.2f}", f"{100 * resources['cpu_share']:.0f} %",
-            f"{resources['peak_memory_mb']:.0f}", f"{summary['accuracy']['ate_mean_mm']:.2f}"]
+            *(f"{at([u[f'{s}_ms'] for u in updates], 0.5):.2f} / {at([u[f'{s}_ms'] for u in updates], 0.99):.2f}"
+              for s in BEFORE),
+            f"{100 * resources['cpu_share']:.0f} %", f"{resources['peak_memory_mb']:.0f}",
+            f"{summary['accuracy']['ate_mean_mm']:.2f}"]
+
+
+def realtime(bench, name, rates):
+    """Rows of `evpose bench realtime`, as it prints them."""
+    printed = bench.run("bench", "realtime", bench.shared / "data/peer", "--only", name, "--mev-s",
+                        ",".join(map(str, rates)), *(["--updates", 300] if bench.quick else []))
+    return tables.read(printed)[""]
 
 
 def make(bench):
     rows = [bench.once(f"latency: {name} at {rate} Hz", lambda: measure(bench, bench.peer(name), rate))
             for name, rate in (RUNS[2:3] if bench.quick else RUNS)]
-    heads = ["recording", "updates a second", "predict", "choose points", "register", "fuse", "newest event to pose",
-             "events before (p50)", "share of a core", "peak memory MB", "ATE mm"]
-    return bench.write_page("latency", {"stages": tables.table(heads, rows)}, harness.machine())
+    heads = ["recording", "updates a second", "predict", "register", "fuse", "newest event to pose",
+             "before it: points and bands", "before it: events", "share of a core", "peak memory MB", "ATE mm"]
+    loads = {"room_720p": [5]} if bench.quick else REALTIME
+    under_load = [row for name, rates in loads.items()
+                  for row in bench.once(f"realtime: {name}, {rates}", lambda: realtime(bench, name, rates))]
+    figures = {"stages": tables.table(heads, rows),
+               "realtime": tables.table(list(under_load[0]), [list(row.values()) for row in under_load])}
+    return bench.write_page("latency", figures, harness.machine())

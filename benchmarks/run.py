@@ -34,7 +34,7 @@ BENCHMARKS = {
     "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "15 min"),
     "map": ("maps", "make", "maps built from clouds, and tracking with them", "15 min"),
     "map-scale": ("map_scale", "make", "time and memory of map building", "10 min"),
-    "latency": ("latency", "make", "stages of an update on whole recordings", "1 min"),
+    "latency": ("latency", "make", "stages of an update on whole recordings, and at high rates", "3 min"),
     "performance": ("performance", "make", "kernels and decoders by themselves (evpose_microbench)", "10 min"),
     "live": ("live", "make", "delay of evpose serve", "1 min"),
     "soak": ("live", "make_soak", "memory of evpose serve over half an hour", "30 min"),

@@ -9,6 +9,7 @@
 #include "evpose/bench/experiments/calibration.h"
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
+#include "evpose/bench/experiments/realtime.h"
 #include "evpose/bench/experiments/relocalization.h"
 #include "evpose/bench/experiments/residuals.h"
 #include "evpose/bench/experiments/unseen/unseen.h"
@@ -124,6 +125,19 @@ void add_faults(CLI::App& bench, Run& run) {
   });
 }
 
+void add_realtime(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("realtime", "Speed and delay at high rates of events, on one core");
+  auto request = std::make_shared<experiments::RealtimeRequest>();
+  add_selection(*command, request->selection);
+  command->add_option("--mev-s", request->rates_mev_s, "rates of events, with random ones added")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--updates", request->updates_hz, "updates a second")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->callback([=, &run] { run = [=] { return exit_status(experiments::print_realtime(*request)); }; });
+}
+
 void add_residuals(CLI::App& bench, Run& run) {
   auto* command = bench.add_subcommand("residuals", "Where events lie beside the contours of the true pose");
   auto request = std::make_shared<experiments::ResidualsRequest>();
@@ -201,6 +215,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_relocalization(*bench, run);
   add_event_origins(*bench, run);
   add_faults(*bench, run);
+  add_realtime(*bench, run);
   add_residuals(*bench, run);
   add_picture(*bench, run);
   add_unseen(*bench, run);

@@ -50,6 +50,10 @@ class DeterminismTest(unittest.TestCase):
         self.same("packet_ms=0.1")
         self.same("packet_ms=10")
 
+    def test_with_pictures_and_without(self):
+        self.same("overlays=0")
+        self.same("overlays=20", "packet_ms=3")
+
     def test_every_back_end(self):
         for kind in ("graph", "particle", "ekf"):
             reference = self.track(f"{kind}_1", f"fusion.kind={kind}")

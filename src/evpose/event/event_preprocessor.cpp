@@ -2,6 +2,7 @@
 #include "evpose/event/event_preprocessor.h"
 
 #include <algorithm>
+#include <array>
 
 #include "evpose/core/config.h"
 
@@ -9,74 +10,120 @@ namespace evpose {
 namespace {
 constexpr double kAllowed_us = 5000;  // of the limit's rate may come at once
 constexpr std::size_t kAhead = 16;    // events; as long as memory takes to answer
+constexpr std::size_t kBlock = 256;   // events that are looked at together, within the first cache
+
+FilteredEvent stamped(const Event& e, std::int64_t base_us) {
+  return {static_cast<std::uint32_t>(std::max<std::int64_t>(base_us + e.dt_us, 1)), e.x, e.y, e.on};
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, EventPreprocessorConfig& c) {
   table.group("noise_filter", c.noise);
-  table.add("most_mev_s", c.most_mev_s, "Mev/s", "events are shed beyond this rate; 0: never", {0, 1e5});
+  table.add("most_mev_s", c.most_mev_s, "Mev/s", "events that matter are shed beyond this rate; 0: never",
+            {0, 1e5});
 }
 
 EventPreprocessor::EventPreprocessor(int width, int height, const EventPreprocessorConfig& config)
     : config_(config), width_(width), height_(height), noise_filter_(width, height, config.noise) {}
 
-void EventPreprocessor::set_motion(double flow_px_per_s) { noise_filter_.set_motion(flow_px_per_s); }
+void EventPreprocessor::set_motion(double flow_px_per_s) {
+  noise_filter_.set_motion(flow_px_per_s);
+  if (drawn_) drawn_->filter.set_motion(flow_px_per_s);
+}
 
 void EventPreprocessor::keep_surface(bool on) {
-  if (!on) return surface_.reset();
-  if (!surface_) surface_.emplace(width_, height_);
+  if (!on) return drawn_.reset();
+  if (!drawn_)
+    drawn_.emplace(Drawn{NoiseFilter(width_, height_, config_.noise), TimeSurface(width_, height_)});
 }
 
 void EventPreprocessor::rebase(std::uint32_t shift_us) {
   noise_filter_.rebase(shift_us);
-  if (surface_) surface_->rebase(shift_us);
+  if (drawn_) drawn_->filter.rebase(shift_us), drawn_->surface.rebase(shift_us);
   refilled_us_ = refilled_us_ > shift_us ? refilled_us_ - shift_us : 0;
   for (FilteredEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
 
+/// Of the packet, on a clock that holds all of the events.
+std::int64_t EventPreprocessor::base_us(const EventPacket& packet, std::span<const Event> events) {
+  clock_.microseconds(packet.time(events.front()));  // where it starts
+  clock_.stamp(packet.time(events.back()), [this](std::uint32_t shift) { rebase(shift); });
+  return clock_.microseconds(packet.time(events.front())) - events.front().dt_us;
+}
+
 void EventPreprocessor::take(const EventPacket& packet, std::span<const Event> events) {
   if (events.empty()) return;
-  std::int64_t base_us = clock_.microseconds(packet.time(events.front())) - events.front().dt_us;
+  const std::int64_t base = base_us(packet, events);
+  const std::size_t before = kept_.size();
+  counts_.read += static_cast<std::int64_t>(events.size());
+  if (interest_ != nullptr)
+    take_where(events, base, [this](const Event& e) { return interest_->holds(e.x, e.y); });
+  else
+    take_where(events, base, [](const Event&) { return true; });
+  counts_.kept += static_cast<std::int64_t>(kept_.size() - before);
+  if (!drawn_) return;
+  if (interest_ != nullptr) return draw(events, base);
+  for (std::size_t i = before; i < kept_.size(); ++i)
+    drawn_->surface.insert(kept_[i].x, kept_[i].y, kept_[i].on ? Polarity::on : Polarity::off,
+                           kept_[i].stamp_us);
+}
+
+/// Most events matter nowhere: each is written in any case and kept by counting, as a branch would be guessed
+/// wrong.
+template <class Matters>
+void EventPreprocessor::take_where(std::span<const Event> events, std::int64_t base_us,
+                                   const Matters& matters) {
+  std::array<FilteredEvent, kBlock> block;
+  for (std::size_t begin = 0; begin < events.size(); begin += kBlock) {
+    std::size_t count = 0, inside = 0;
+    const std::size_t end = std::min(begin + kBlock, events.size());
+    for (std::size_t i = begin; i < end; ++i) {
+      const bool in_image = (events[i].x < width_) & (events[i].y < height_);
+      block[count] = stamped(events[i], base_us);
+      count += in_image & matters(events[i]);
+      inside += in_image;
+    }
+    counts_.outside += static_cast<std::int64_t>(end - begin - inside);
+    filter({block.data(), count});
+  }
+}
+
+/// Hands on what passes the limit of the rate and the noise filter.
+void EventPreprocessor::filter(std::span<const FilteredEvent> events) {
   for (std::size_t i = 0; i < events.size(); ++i) {
-    if (i + kAhead < events.size()) {
-      const Event& later = events[i + kAhead];
-      if (later.x < width_ && later.y < height_) noise_filter_.prefetch(later.x, later.y);
-    }
-    const Event& e = events[i];
-    ++counts_.read;
-    if (e.x >= width_ || e.y >= height_) {
-      ++counts_.outside;
-      continue;
-    }
-    if (base_us + e.dt_us > StampClock::kLargest) {
-      clock_.stamp(packet.time(e), [this](std::uint32_t shift) { rebase(shift); });
-      base_us = clock_.microseconds(packet.time(e)) - e.dt_us;
-    }
-    const auto stamp = static_cast<std::uint32_t>(std::max<std::int64_t>(base_us + e.dt_us, 1));
-    if (config_.most_mev_s > 0 && shed(e, stamp)) {
-      ++counts_.shed;
-      continue;
-    }
-    if (!noise_filter_.keep(e.x, e.y, stamp)) continue;
-    ++counts_.kept;
-    kept_.push_back({stamp, e.x, e.y, e.on});
-    if (surface_) surface_->insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, stamp);
+    if (i + kAhead < events.size()) noise_filter_.prefetch(events[i + kAhead].x, events[i + kAhead].y);
+    const FilteredEvent& e = events[i];
+    if (!shed(e) && noise_filter_.keep(e.x, e.y, e.stamp_us)) kept_.push_back(e);
+  }
+}
+
+void EventPreprocessor::draw(std::span<const Event> events, std::int64_t base_us) {
+  for (const Event& event : events) {
+    const FilteredEvent e = stamped(event, base_us);
+    if (e.x < width_ && e.y < height_ && drawn_->filter.keep(e.x, e.y, e.stamp_us))
+      drawn_->surface.insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, e.stamp_us);
   }
 }
 
 /// The fuller the last milliseconds were, the fewer events pass: which of them is by chance, so that no part
 /// of the image or of a burst is preferred, but always the same for the same event.
-bool EventPreprocessor::shed(const Event& e, std::uint32_t stamp_us) {
+bool EventPreprocessor::shed(const FilteredEvent& e) {
+  if (!(config_.most_mev_s > 0)) return false;
   const double full = kAllowed_us * config_.most_mev_s;
   if (refilled_us_ == 0) allowance_ = full;
-  if (stamp_us > refilled_us_) {
-    allowance_ = std::min(full, allowance_ + config_.most_mev_s * (stamp_us - refilled_us_));
-    refilled_us_ = stamp_us;
+  if (e.stamp_us > refilled_us_) {
+    allowance_ = std::min(full, allowance_ + config_.most_mev_s * (e.stamp_us - refilled_us_));
+    refilled_us_ = e.stamp_us;
   }
   if (allowance_ < 0.5 * full) {
-    std::uint32_t h = (stamp_us * 0x9E3779B1u) ^ (e.x * 0x85EBCA77u) ^ (e.y * 0xC2B2AE3Du);
+    std::uint32_t h = (e.stamp_us * 0x9E3779B1u) ^ (e.x * 0x85EBCA77u) ^ (e.y * 0xC2B2AE3Du);
     h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
     h ^= h >> 13;
-    if (h > allowance_ / (0.5 * full) * 4294967295.0) return true;
+    if (h > allowance_ / (0.5 * full) * 4294967295.0) {
+      ++counts_.shed;
+      return true;
+    }
   }
   allowance_ -= 1;
   return false;

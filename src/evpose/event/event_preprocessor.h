@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "evpose/event/event.h"
+#include "evpose/event/interest_map.h"
 #include "evpose/event/noise_filter.h"
 #include "evpose/event/time_surface.h"
 
@@ -16,11 +17,11 @@ class ConfigTable;
 
 struct EventPreprocessorConfig {
   NoiseFilterConfig noise;
-  double most_mev_s = 100;  ///< events are shed beyond this rate, spread evenly; 0: never
+  double most_mev_s = 100;  ///< events that matter are shed beyond this rate, spread evenly; 0: never
 };
 void describe(ConfigTable& table, EventPreprocessorConfig& config);
 
-/// An event that passed the filter, in microseconds of the stamps' clock.
+/// An event that is handed on, in microseconds of the stamps' clock.
 struct FilteredEvent {
   std::uint32_t stamp_us;
   std::uint16_t x;
@@ -28,7 +29,8 @@ struct FilteredEvent {
   std::uint16_t on : 1;
 };
 
-/// The way of every event: rate limit and noise filter, in one pass; then, if asked for, the time surface.
+/// The way of every event: from where it can matter, below the limit of the rate, through the noise filter to
+/// those who look at it; and, if asked for, into the time surface.
 class EventPreprocessor {
  public:
   EventPreprocessor(int width, int height, const EventPreprocessorConfig& config);
@@ -36,22 +38,25 @@ class EventPreprocessor {
   /// Takes events of `packet` (a part of it, in order). Events outside the image are counted and left out.
   void take(const EventPacket& packet, std::span<const Event> events);
 
+  /// Where events matter from here on; null: everywhere. The map is kept a reference to.
+  void set_interest(const InterestMap* interest) { interest_ = interest; }
   /// Predicted image motion from here on, px/s (a typical one; <= 0: unknown).
   void set_motion(double flow_px_per_s);
 
-  /// Kept since the last call of clear_kept(), in order of time.
+  /// Handed on since the last call of clear_kept(), in order of time.
   std::span<const FilteredEvent> kept() const { return kept_; }
   void clear_kept() { kept_.clear(); }
 
-  /// From now on every event that is kept is drawn into the time surface, or no longer. The surface begins
-  /// empty.
+  /// From now on every event that passes a noise filter is drawn into the time surface, wherever it is, or no
+  /// longer. The surface begins empty. What is handed on is the same with it and without.
   void keep_surface(bool on);
   /// Null unless it is kept.
-  const TimeSurface* surface() const { return surface_ ? &*surface_ : nullptr; }
+  const TimeSurface* surface() const { return drawn_ ? &drawn_->surface : nullptr; }
   /// Stamp of a time on the events' clock, which the surface shares.
   std::uint32_t stamp(TimeNs t) const { return clock_.at(t); }
   const NoiseFilter& noise_filter() const { return noise_filter_; }
 
+  /// Kept: handed on. Shed: for the limit of the rate.
   struct Counts {
     std::int64_t read = 0, kept = 0, outside = 0, shed = 0;
   };
@@ -59,13 +64,23 @@ class EventPreprocessor {
 
  private:
   void rebase(std::uint32_t shift_us);
-  bool shed(const Event& event, std::uint32_t stamp_us);
+  std::int64_t base_us(const EventPacket& packet, std::span<const Event> events);
+  template <class Matters>
+  void take_where(std::span<const Event> events, std::int64_t base_us, const Matters& matters);
+  void filter(std::span<const FilteredEvent> events);
+  void draw(std::span<const Event> events, std::int64_t base_us);
+  bool shed(const FilteredEvent& event);
 
   EventPreprocessorConfig config_;
   int width_, height_;
   StampClock clock_;
+  const InterestMap* interest_ = nullptr;
   NoiseFilter noise_filter_;
-  std::optional<TimeSurface> surface_;
+  struct Drawn {
+    NoiseFilter filter;  ///< of its own: it sees events that are not handed on
+    TimeSurface surface;
+  };
+  std::optional<Drawn> drawn_;
   double allowance_ = 0;  ///< events that may come at once now; refilled at the rate's limit
   std::uint32_t refilled_us_ = 0;
   std::vector<FilteredEvent> kept_;

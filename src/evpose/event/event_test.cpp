@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "evpose/event/event_preprocessor.h"
@@ -116,6 +117,69 @@ TEST(EventPreprocessor, IsTheSameHoweverThePacketsAreCut) {
   }
   EXPECT_EQ(whole.counts().kept, cut.counts().kept);
   EXPECT_EQ(contents(whole), contents(cut));
+}
+
+TEST(InterestMap, HoldsTheCellsThatAreMarked) {
+  for (const auto& [width, height] : {std::pair{13, 9}, {300, 40}, {1280, 720}}) {
+    std::mt19937 random(2);
+    InterestMap map(width, height);
+    std::vector<bool> cells(static_cast<std::size_t>(map.columns() * map.rows()));
+    for (int i = 0; i < 12; ++i) {
+      const int row = static_cast<int>(random() % static_cast<unsigned>(map.rows()));
+      int first = static_cast<int>(random() % static_cast<unsigned>(map.columns())), last = first;
+      last += static_cast<int>(random() % static_cast<unsigned>(map.columns() - first));
+      map.mark(row, first, last);
+      for (int c = first; c <= last; ++c) cells[static_cast<std::size_t>(row * map.columns() + c)] = true;
+    }
+    std::size_t marked = 0;
+    for (int y = 0; y < height + 3; ++y)
+      for (int x = 0; x < width + 3; ++x) {
+        const int cell = y / InterestMap::kCell_px * map.columns() + x / InterestMap::kCell_px;
+        const bool inside = x < width && y < height;
+        ASSERT_EQ(map.holds(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)),
+                  inside && cells[static_cast<std::size_t>(cell)])
+            << x << ' ' << y;
+      }
+    for (const bool cell : cells) marked += cell;
+    EXPECT_NEAR(map.share(), static_cast<double>(marked) / static_cast<double>(cells.size()), 1e-12);
+    map.clear();
+    EXPECT_EQ(map.share(), 0);
+  }
+}
+
+TEST(EventPreprocessor, HandsOnWhatMattersWhetherThereIsASurfaceOrNot) {
+  const EventPacket all = random_events(20000, 43, 33, 30);  // some outside of the image
+  InterestMap interest(40, 30);
+  interest.mark(2, 3, 7);
+  std::vector<std::vector<std::uint32_t>> taken;
+  for (const bool surface : {false, true}) {
+    EventPreprocessor front(40, 30, {});
+    front.keep_surface(surface);
+    front.set_interest(&interest);
+    front.take(all, std::span(all.events).first(7001));
+    front.take(all, std::span(all.events).subspan(7001));
+    NoiseFilter filter(40, 30, {});
+    std::vector<std::uint32_t> expected;
+    std::int64_t outside = 0;
+    for (const Event& e : all.events) {
+      outside += e.x >= 40 || e.y >= 30;
+      const std::uint32_t stamp = front.stamp(all.time(e));
+      if (e.x >= 12 && e.x < 32 && e.y >= 8 && e.y < 12 && filter.keep(e.x, e.y, stamp))
+        expected.push_back(stamp);
+    }
+    taken.emplace_back();
+    for (const FilteredEvent& e : front.kept()) taken.back().push_back(e.stamp_us);
+    EXPECT_EQ(taken.back(), expected);
+    EXPECT_GT(expected.size(), 100U);
+    EXPECT_EQ(front.counts().read, 20000);
+    EXPECT_EQ(front.counts().outside, outside);
+    EXPECT_EQ(front.counts().kept, static_cast<std::int64_t>(expected.size()));
+    // Pictures show more than what is handed on.
+    if (!surface) continue;
+    const std::vector<std::uint32_t> drawn = contents(front);
+    EXPECT_GT(drawn.size() - static_cast<std::size_t>(std::count(drawn.begin(), drawn.end(), 0U)), 500U);
+  }
+  EXPECT_EQ(taken[0], taken[1]);
 }
 
 TEST(EventPreprocessor, ClockSurvivesHoursOfData) {

@@ -11,7 +11,10 @@ namespace evpose {
 namespace {
 
 constexpr double kInTime = 0.9;            // of the way to a refresh, the next choice shall be there
+constexpr double kWhileUsed = 0.6;         // of the way to a refresh, the next choice may take
 constexpr float kExamined = 0.4F;          // of the stride, in the image: spacing of the points examined
+constexpr std::size_t kSlice = 500;        // points examined in a call, if there is time
+constexpr std::size_t kMostUpdates = 100;  // that a choice may take
 constexpr std::size_t kCellsAPoint = 200;  // filled in the time that a point takes
 constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 constexpr double kDepthCell_px = 2;  // of the occluders' depth buffer, in an image 640 wide
@@ -86,29 +89,39 @@ double VisibleSet::moved_px(const Pose& from, const Pose& to) const {
 
 const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
   const double moved = chosen_once_ ? moved_px(T_map_cam_, T_map_cam) : 2 * config_.refresh_px + 1;
-  const double step = last_ ? moved_px(*last_, T_map_cam) : 0;
+  const Pose before = last_.value_or(T_map_cam);
   last_ = T_map_cam;
   if (moved > config_.refresh_px) {
     // Too late to take one's time, unless what is under way is of this place.
     if (calls_left_ == 0 || moved_px(next_T_map_cam_, T_map_cam) > 0.5 * config_.refresh_px)
-      begin_choice(T_map_cam);
+      begin_choice(T_map_cam, 1);
     complete_choice();
   } else if (calls_left_ > 0) {
     if (--calls_left_ == 0)
       complete_choice();
     else if (!job_.valid())
       examine(remaining_ / static_cast<std::size_t>(calls_left_ + 1));
-  } else if (moved + config_.updates * step > kInTime * config_.refresh_px) {
-    begin_choice(T_map_cam);
+  } else if (const double step = moved_px(before, T_map_cam);
+             moved + updates_for_choice(step) * step > kInTime * config_.refresh_px) {
+    // For where it will be half-way until it is taken: as near if the motion ends as if it goes on.
+    const int updates = updates_for_choice(step);
+    begin_choice(T_map_cam.plus(0.5 * updates * T_map_cam.minus(before)), updates);
     if (background_) job_ = std::async(std::launch::async, [this] { examine(kAll); });
   }
   return points_;
 }
 
-void VisibleSet::begin_choice(const Pose& T_map_cam) {
+/// As many as make a call's part small, if there is time for it.
+int VisibleSet::updates_for_choice(double step_px) const {
+  const auto wanted = static_cast<double>(std::min(effort_ / kSlice + 1, kMostUpdates));
+  const double in_time = step_px > 0 ? kWhileUsed * config_.refresh_px / step_px : wanted;
+  return std::max(config_.updates, static_cast<int>(std::min(wanted, in_time)));
+}
+
+void VisibleSet::begin_choice(const Pose& T_map_cam, int updates) {
   if (job_.valid()) job_.get();
   list_candidates(T_map_cam);
-  calls_left_ = config_.updates;
+  calls_left_ = updates;
 }
 
 void VisibleSet::complete_choice() {

@@ -26,7 +26,7 @@ struct VisibleSetConfig {
   double near_m = 0.1;     ///< points nearer are left out: no camera is sharp there
   double margin_px = 20;   ///< points may lie this far outside of the image when chosen
   double refresh_px = 16;  ///< chosen again before the view has moved by this much: less than the margin
-  int updates = 6;         ///< that a choice takes, fewer in fast motion
+  int updates = 6;         ///< that a choice takes at least, but for fast motion
   double grazing_sin =
       0.17;  ///< contours seen at a smaller sine of the angle to the line of sight are left out
 };
@@ -50,7 +50,8 @@ class VisibleSet {
 
  private:
   double moved_px(const Pose& from, const Pose& to) const;
-  void begin_choice(const Pose& T_map_cam);
+  int updates_for_choice(double step_px) const;
+  void begin_choice(const Pose& T_map_cam, int updates);
   /// Does what is left of the choice under way, and takes it.
   void complete_choice();
   void list_candidates(const Pose& T_map_cam);
@@ -81,7 +82,7 @@ class VisibleSet {
   bool finished_ = false;
   Eigen::Matrix3f R_cam_map_;
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
-  std::size_t effort_ = 0;  ///< that it took so far
+  std::size_t effort_ = 0;  ///< that it took so far, or that the last one took
   DepthBuffer depth_;
   std::vector<std::uint32_t> occluders_, cubes_;  ///< in view, what is left to examine
   std::size_t occluders_done_ = 0, cubes_done_ = 0, remaining_ = 0;

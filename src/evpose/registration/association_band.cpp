@@ -23,6 +23,42 @@ using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
 
 float inverse(float v) { return std::abs(v) > 1 / kFarther ? 1 / v : kFarther; }
 
+/// Half so wide along its normal and half so high across it.
+struct Rectangle {
+  float x, y, nx, ny, wide, high;
+};
+
+/// What the band touches during the span, and a little more.
+Rectangle swept(const AssociationBand& s, float half_length, float span_us) {
+  const float half_us = 0.5F * span_us, middle = -(s.speed - s.curvature * half_us) * half_us;
+  const float sway = std::abs(s.speed) * half_us + 3 * std::abs(s.curvature) * half_us * half_us;
+  return {s.x + middle * s.nx, s.y + middle * s.ny, s.nx, s.ny, s.reach + sway, half_length};
+}
+
+/// Calls take(row, first column, last column) for the cells of `cell_px` that meet the rectangle.
+template <class Take>
+void for_each_row(const Rectangle& s, int cell_px, int columns, int rows, const Take& take) {
+  // In units of cells, whose centres are at whole numbers; a cell is met when its centre is within the
+  // rectangle grown by the cell's own extent.
+  const float per_cell = 1.0F / static_cast<float>(cell_px);
+  const float x0 = s.x * per_cell - 0.5F, y0 = s.y * per_cell - 0.5F;
+  const float own = 0.5F * (std::abs(s.nx) + std::abs(s.ny));
+  const float wide = s.wide * per_cell + own, high = s.high * per_cell + own;
+  const float height = std::abs(s.ny) * wide + std::abs(s.nx) * high;
+  const float top = std::max(0.0F, std::ceil(y0 - height)),
+              bottom = std::min(static_cast<float>(rows - 1), std::floor(y0 + height));
+  const auto last_column = static_cast<float>(columns - 1);
+  const float by_nx = inverse(s.nx), by_ny = inverse(s.ny);
+  const float across = wide * std::abs(by_nx), along = high * std::abs(by_ny);
+  for (float y = top; y <= bottom; ++y) {
+    // |n.r| <= wide and |t.r| <= high, solved for x.
+    const float ry = y - y0, middle_n = -s.ny * ry * by_nx, middle_t = s.nx * ry * by_ny;
+    const float first = std::max(0.0F, std::ceil(x0 + std::max(middle_n - across, middle_t - along)));
+    const float last = std::min(last_column, std::floor(x0 + std::min(middle_n + across, middle_t + along)));
+    if (first <= last) take(static_cast<int>(y), static_cast<int>(first), static_cast<int>(last));
+  }
+}
+
 }  // namespace
 
 AssociationIndex::AssociationIndex(ImageSize size, double half_length_px, double ambiguity_px)
@@ -37,37 +73,30 @@ void AssociationIndex::build(std::span<const AssociationBand> bands, float span_
   bands_.push_back({0, 0, 0, 0, 0, 0, -1});
   entries_.assign(1, {static_cast<std::int32_t>(bands.size()), 0});
   std::fill(heads_.begin(), heads_.end(), 0);
-  for (std::size_t i = 0; i < bands.size(); ++i) enter(static_cast<std::int32_t>(i), span_us);
+  span_us_ = span_us;
+  for (std::size_t i = 0; i < bands.size(); ++i) enter(static_cast<std::int32_t>(i));
 }
 
 /// Into every cell that the band touches during the span.
-void AssociationIndex::enter(std::int32_t number, float span_us) {
-  const AssociationBand& s = bands_[static_cast<std::size_t>(number)];
-  const float half_us = 0.5F * span_us, middle = -(s.speed - s.curvature * half_us) * half_us;
-  // In units of cells, whose centres are at whole numbers; a cell is met when its centre is within the
-  // rectangle grown by the cell's own extent.
-  constexpr float kPerCell = 1.0F / kCell_px;
-  const float x0 = (s.x + middle * s.nx) * kPerCell - 0.5F, y0 = (s.y + middle * s.ny) * kPerCell - 0.5F;
-  const float own = 0.5F * (std::abs(s.nx) + std::abs(s.ny));
-  const float sway = std::abs(s.speed) * half_us + 3 * std::abs(s.curvature) * half_us * half_us;
-  const float wide = (s.reach + sway) * kPerCell + own, high = half_length_ * kPerCell + own;
-  const float height = std::abs(s.ny) * wide + std::abs(s.nx) * high;
-  const float top = std::max(0.0F, std::ceil(y0 - height)),
-              bottom = std::min(static_cast<float>(rows_ - 1), std::floor(y0 + height));
-  const auto last_column = static_cast<float>(columns_ - 1);
-  const float by_nx = inverse(s.nx), by_ny = inverse(s.ny);
-  const float across = wide * std::abs(by_nx), along = high * std::abs(by_ny);
-  for (float y = top; y <= bottom; ++y) {
-    // |n.r| <= wide and |t.r| <= high, solved for x.
-    const float ry = y - y0, middle_n = -s.ny * ry * by_nx, middle_t = s.nx * ry * by_ny;
-    const float first = std::max(0.0F, std::ceil(x0 + std::max(middle_n - across, middle_t - along)));
-    const float last = std::min(last_column, std::floor(x0 + std::min(middle_n + across, middle_t + along)));
-    for (float x = first; x <= last; ++x) {
-      std::int32_t& head =
-          heads_[static_cast<std::size_t>(static_cast<int>(y) * columns_ + static_cast<int>(x))];
-      entries_.push_back({number, head});
-      head = static_cast<std::int32_t>(entries_.size() - 1);
-    }
+void AssociationIndex::enter(std::int32_t number) {
+  const AssociationBand& band = bands_[static_cast<std::size_t>(number)];
+  for_each_row(swept(band, half_length_, span_us_), kCell_px, columns_, rows_,
+               [&](int row, int first, int last) {
+                 for (int column = first; column <= last; ++column) {
+                   std::int32_t& head = heads_[static_cast<std::size_t>(row * columns_ + column)];
+                   entries_.push_back({number, head});
+                   head = static_cast<std::int32_t>(entries_.size() - 1);
+                 }
+               });
+}
+
+void AssociationIndex::mark(float margin_px, InterestMap* interest) const {
+  for (std::size_t i = 0; i + 1 < bands_.size(); ++i) {
+    Rectangle area = swept(bands_[i], half_length_, span_us_);
+    area.wide += margin_px;
+    area.high += margin_px;
+    for_each_row(area, InterestMap::kCell_px, interest->columns(), interest->rows(),
+                 [&](int row, int first, int last) { interest->mark(row, first, last); });
   }
 }
 
@@ -88,17 +117,16 @@ AssociationIndex::Owner AssociationIndex::find(float x, float y, float age_us) c
   return n < 2 ? nearest : resolve(nearest, {hits, static_cast<std::size_t>(n)});
 }
 
-void AssociationIndex::find_all(std::span<const FilteredEvent> events, std::uint32_t now_us,
-                                std::vector<Found>* found) {
+void AssociationIndex::find_all(std::span<const FilteredEvent> events, std::size_t first,
+                                std::uint32_t now_us, std::vector<Found>* found) {
   // Most events are far from any contour: written in any case and kept by counting, as a branch would be
   // guessed wrong.
-  close_.resize(events.size());
+  close_.resize(events.size() - first);
   std::size_t count = 0;
-  for (std::size_t k = 0; k < events.size(); ++k) {
+  for (std::size_t k = first; k < events.size(); ++k) {
     close_[count] = static_cast<std::uint32_t>(k);
     count += heads_[cell_of(events[k].x, events[k].y)] > 0;
   }
-  found->clear();
   for (std::size_t begin = 0; begin < count; begin += kSide)
     find_eight(events, {&close_[begin], std::min(kSide, count - begin)}, now_us, found);
 }

@@ -7,6 +7,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/event/event_preprocessor.h"
+#include "evpose/event/interest_map.h"
 
 namespace evpose {
 
@@ -41,9 +42,14 @@ class AssociationIndex {
     std::uint32_t event;
     Owner owner;
   };
-  /// The events that a band owns, in their order; `now_us`: of the bands, on the events' clock. As find()
-  /// for each, eight side by side, which differs by rounding.
-  void find_all(std::span<const FilteredEvent> events, std::uint32_t now_us, std::vector<Found>* found);
+  /// Appends the events from number `first` on that a band owns, in their order; `now_us`: of the bands, on
+  /// the events' clock. As find() for each, eight side by side, which differs by rounding; the same for any
+  /// `first`.
+  void find_all(std::span<const FilteredEvent> events, std::size_t first, std::uint32_t now_us,
+                std::vector<Found>* found);
+
+  /// Marks where the bands come by during the span, and `margin_px` around it.
+  void mark(float margin_px, InterestMap* interest) const;
 
  private:
   static constexpr int kCell_px = 8, kMostHits = 16;  // more than so many bands at one place are a tangle
@@ -61,10 +67,11 @@ class AssociationIndex {
     return static_cast<std::size_t>(static_cast<int>(y) / kCell_px * columns_ +
                                     static_cast<int>(x) / kCell_px);
   }
-  void enter(std::int32_t number, float span_us);
+  void enter(std::int32_t number);
 
   int columns_, rows_;
   float half_length_, ambiguity_;
+  float span_us_ = 0;
   std::vector<AssociationBand> bands_;  ///< and one more, which nothing is near
   std::vector<Entry> entries_;        ///< the first is every list's end: it is of that band and its own next
   std::vector<std::int32_t> heads_;   ///< of each cell's list of entries

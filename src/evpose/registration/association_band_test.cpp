@@ -143,7 +143,8 @@ TEST(AssociationIndex, ManyEventsFindWhatEachFindsAlone) {
       e.y = static_cast<unsigned>(p.y) & 0x7fffU;
     }
     std::vector<AssociationIndex::Found> found;
-    index.find_all(events, kNow_us, &found);
+    index.find_all({events.data(), count / 3}, 0, kNow_us, &found);
+    index.find_all(events, count / 3, kNow_us, &found);
     std::size_t next = 0, rounded = 0;
     for (std::uint32_t k = 0; k < count; ++k) {
       const FilteredEvent& e = events[k];
@@ -164,6 +165,34 @@ TEST(AssociationIndex, ManyEventsFindWhatEachFindsAlone) {
     EXPECT_LE(rounded, count / 1000);
     EXPECT_GE(found.size(), count / 10);
   }
+}
+
+/// Where a band owns events is marked, and no more than what is near it.
+TEST(AssociationIndex, TheMapOfInterestHoldsWhatIsOwned) {
+  constexpr float kMargin_px = 2, kSlack_px = kMargin_px + 1.5F * InterestMap::kCell_px;
+  Random random(6);
+  int owned = 0, beside = 0;
+  for (int i = 0; i < 300; ++i) {
+    const AssociationBand s = random.band();
+    const AssociationIndex index = index_of({&s, 1});
+    InterestMap interest(kSize.width, kSize.height);
+    index.mark(kMargin_px, &interest);
+    for (std::uint32_t y = 0; y < 120; ++y)
+      for (std::uint32_t x = 0; x < 160; ++x) {
+        const Place p{static_cast<float>(x), static_cast<float>(y), random.in(0, kSpan_us)};
+        const bool is_owned = index.find(p.x, p.y, p.age_us).band == 0;
+        ASSERT_TRUE(!is_owned || interest.holds(x, y)) << x << ' ' << y;
+        owned += is_owned;
+        const float sway = std::abs(s.speed) * kSpan_us + 4 * std::abs(s.curvature) * kSpan_us * kSpan_us;
+        if (std::abs(distance(s, p)) > s.reach + sway + kSlack_px ||
+            along(s, p) > kHalfLength_px + kSlack_px) {
+          ASSERT_FALSE(interest.holds(x, y)) << x << ' ' << y;
+          ++beside;
+        }
+      }
+  }
+  EXPECT_GT(owned, 1000);
+  EXPECT_GT(beside, 1000);
 }
 
 TEST(AssociationIndex, EarlierBandsAreForgotten) {

@@ -21,6 +21,9 @@ constexpr double kFullDelay_px_s =
     20;  // below this flow the edge delay fades out: noise, not the edge, triggers
 constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a contour and still be found
 constexpr int kClustersPerWidth = 20;     // cells whose events share an error: 32 px at VGA
+// So far beside the expected bands events matter: the prediction may differ from the forecast by 1.5 px, and
+// neighbours support each other in the noise filter.
+constexpr float kInterestMargin_px = 2.5F;
 
 // Gate concentration.
 constexpr double kGateRim = 0.8;              // events beyond this share of the gate tell the density at it
@@ -89,9 +92,14 @@ EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
   return {fade * full.on_px, fade * full.off_px};
 }
 
+/// Half width of the gate, px.
+double EventRegistration::gate_of(const ContourSample& s) const {
+  return std::sqrt(config_.gate_px * config_.gate_px + 4 * s.map_sigma_px * s.map_sigma_px);
+}
+
 /// Gate, edge delay, weight and excluded polarities of one sample.
-EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance,
-                                                   double gate) const {
+EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance) const {
+  const double gate = gate_of(s);
   const double variance =
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
   const double odds = kContourPrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kContourPrior);
@@ -104,18 +112,16 @@ EventRegistration::Line EventRegistration::line_of(const ContourSample& s, doubl
           static_cast<float>(odds),
           static_cast<std::int8_t>(polarity_is_wrong(s, forward)),
           static_cast<std::int8_t>(polarity_is_wrong(s, -forward)),
-          static_cast<std::int8_t>(forward)};
+          static_cast<std::int8_t>(forward),
+          0,
+          0};
 }
 
-/// What pixels the samples answer for, and by what rules.
-void EventRegistration::build_bands(const RegistrationProblem& p) {
-  const std::size_t n = p.samples.size();
-  bands_.resize(n);
-  lines_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const ContourSample& s = p.samples[i];
-    const double pose_variance = std::max(0.0, s.jacobian.dot(p.pose_covariance * s.jacobian));
-    const double gate = std::sqrt(config_.gate_px * config_.gate_px + 4 * s.map_sigma_px * s.map_sigma_px);
+/// What pixels the samples answer for.
+void EventRegistration::build_bands(std::span<const ContourSample> samples, double span_s) {
+  bands_.resize(samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const ContourSample& s = samples[i];
     const Eigen::Vector2f pixel = s.pixel.cast<float>(), normal = s.normal_px.cast<float>();
     bands_[i] = {pixel.x(),
                  pixel.y(),
@@ -123,10 +129,36 @@ void EventRegistration::build_bands(const RegistrationProblem& p) {
                  normal.y(),
                  static_cast<float>(1e-6 * s.speed_px_s),
                  static_cast<float>(1e-12 * s.curvature_px_s2),
-                 static_cast<float>(std::max(gate, config_.contrast_band_px) + kLargestDelay_px)};
-    lines_[i] = line_of(s, pose_variance, gate);
+                 static_cast<float>(std::max(gate_of(s), config_.contrast_band_px) + kLargestDelay_px)};
   }
-  index_.build(bands_, static_cast<float>(1e6 * p.span_s));
+  index_.build(bands_, static_cast<float>(1e6 * span_s));
+  found_.clear();
+  looked_at_ = 0;
+}
+
+bool EventRegistration::expect(const RegistrationForecast& forecast, InterestMap* interest) {
+  build_bands(forecast.samples, forecast.span_s);
+  index_.mark(kInterestMargin_px, interest);
+  return true;
+}
+
+void EventRegistration::look_at(std::span<const FilteredEvent> events, std::uint32_t now_us) {
+  index_.find_all(events, looked_at_, now_us, &found_);
+  looked_at_ = events.size();
+}
+
+/// By what rules the bands judge their events, for those that have any.
+void EventRegistration::make_lines(const RegistrationProblem& p) {
+  lines_.assign(p.samples.size(), {});
+  const ForecastError error = p.forecast.value_or(ForecastError{});
+  for (const auto& [k, owner] : found_) {
+    const auto i = static_cast<std::size_t>(owner.band);
+    if (lines_[i].gate > 0) continue;
+    const ContourSample& s = p.samples[i];
+    lines_[i] = line_of(s, std::max(0.0, s.jacobian.dot(p.pose_covariance * s.jacobian)));
+    lines_[i].shift = static_cast<float>(s.jacobian.dot(error.pose));
+    lines_[i].drift = static_cast<float>(-1e-6 * s.jacobian.head<3>().dot(error.velocity));
+  }
 }
 
 /// An event in the gate that is used.
@@ -149,7 +181,6 @@ void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationRes
   const auto contrast_band_px = static_cast<float>(config_.contrast_band_px);
   if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);
   if (p.verdicts) owners_.assign(p.events.size(), -1);
-  index_.find_all(p.events, p.now_us, &found_);
   for (const auto& [k, owner] : found_) {
     const FilteredEvent& e = p.events[k];
     const auto set_verdict = [&, k = k, band = owner.band](EventVerdict v) {
@@ -157,7 +188,8 @@ void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationRes
     };
     const Line& line = lines_[static_cast<std::size_t>(owner.band)];
     Sum& sum = sums_[static_cast<std::size_t>(owner.band)];
-    const float d = owner.distance + (e.on ? line.delay_on : line.delay_off);
+    const float d = owner.distance + line.shift + line.drift * static_cast<float>(p.now_us - e.stamp_us) +
+                    (e.on ? line.delay_on : line.delay_off);
     if (std::abs(d) <= contrast_band_px) sum.net += e.on ? line.forward : -line.forward;
     set_verdict(EventVerdict::beside);
     if (std::abs(d) > line.gate) continue;
@@ -288,7 +320,9 @@ void EventRegistration::mark_other_motion(const RegistrationProblem& p) {
 RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   EVPOSE_CHECK(!config_.ego_motion_test || p.surface != nullptr);
   RegistrationResult result;
-  build_bands(p);
+  if (!p.forecast) build_bands(p.samples, p.span_s);
+  look_at(p.events, p.now_us);
+  make_lines(p);
   sum_events(p, &result);
   learn_contrast(p);
   number_clusters(p);

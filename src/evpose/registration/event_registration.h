@@ -51,6 +51,8 @@ class EventRegistration final : public Registration {
   EventRegistration(ImageSize size, const EventRegistrationConfig& config, std::uint32_t segments = 1);
 
   RegistrationResult measure(const RegistrationProblem& problem) override;
+  bool expect(const RegistrationForecast& forecast, InterestMap* interest) override;
+  void look_at(std::span<const FilteredEvent> events, std::uint32_t now_us) override;
   void restart() override { concentration_ = {}; }
   bool reads_surface() const override { return config_.ego_motion_test; }
   std::span<const SampleOffset> offsets() const override { return offsets_; }
@@ -68,6 +70,7 @@ class EventRegistration final : public Registration {
     float exponent, odds;             ///< exp(exponent d^2) * odds: of the contour against clutter
     std::int8_t wrong_on, wrong_off;  ///< polarity excluded
     std::int8_t forward;              ///< +1 if the contour moves along its normal, else -1
+    float shift, drift;               ///< the forecast's error: distance px, and per us of age
   };
   struct Sum {
     double weight = 0, offset = 0, square = 0;
@@ -84,8 +87,10 @@ class EventRegistration final : public Registration {
   struct Cluster {
     double weight = 0, map_variance = 0, trust = 1;
   };
-  void build_bands(const RegistrationProblem& problem);
-  Line line_of(const ContourSample& sample, double pose_variance, double gate) const;
+  double gate_of(const ContourSample& sample) const;
+  void build_bands(std::span<const ContourSample> samples, double span_s);
+  void make_lines(const RegistrationProblem& problem);
+  Line line_of(const ContourSample& sample, double pose_variance) const;
   void sum_events(const RegistrationProblem& problem, RegistrationResult* result);
   void add_event(std::int32_t band, float distance, Sum* sum);
   void learn_contrast(const RegistrationProblem& problem);
@@ -107,8 +112,9 @@ class EventRegistration final : public Registration {
   Concentration concentration_;
   // Of the last call, one for each sample; kept so that steady state allocates nothing.
   std::vector<AssociationBand> bands_;
-  std::vector<Line> lines_;
+  std::vector<Line> lines_;  ///< of bands that own events
   std::vector<AssociationIndex::Found> found_;
+  std::size_t looked_at_ = 0;  ///< events, since expect()
   std::vector<Sum> sums_;
   std::vector<SampleOffset> offsets_;
   std::vector<Cluster> clusters_;

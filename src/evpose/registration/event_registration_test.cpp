@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -209,6 +210,42 @@ TEST_F(EventRegistrationLaws, NothingInNothingOut) {
   samples_.clear();
   add_event({150, 60}, 0);
   EXPECT_EQ(measure().events, 0);
+}
+
+/// Looked at as they come, with contours as they were expected, events say what they say of contours as they
+/// are.
+TEST_F(EventRegistrationLaws, EventsThatAreLookedAtAsTheyComeSayTheSame) {
+  config_.gate_truncation_correction = false;  // events at the gate itself decide it
+  add_line({150, 20}, {1, 0.4}, 300, 40);
+  add_line({60, 200}, {0.2, -1}, -200, 40);
+  for (unsigned seed : {1, 2, 3, 4, 5, 6}) draw_events(0.1, seed);
+  std::stable_sort(events_.begin(), events_.end(),
+                   [](const auto& a, const auto& b) { return a.stamp_us < b.stamp_us; });
+  const RegistrationResult batch = measure();
+  ForecastError error;
+  error.pose.head<2>() = Eigen::Vector2d(0.15, -0.1) / kFocal;
+  error.velocity.head<2>() = Eigen::Vector2d(12, 8) / kFocal;
+  std::vector<ContourSample> expected = samples_;
+  for (ContourSample& s : expected) {  // as the error's removal would move them
+    s.pixel += s.jacobian.head<2>().dot(error.pose.head<2>()) * s.normal_px;
+    s.speed_px_s += s.jacobian.head<3>().dot(error.velocity);
+  }
+  for (const std::size_t piece : {1UL, 7UL, 100UL, events_.size()}) {
+    EventRegistration registration({320, 240}, config_);
+    InterestMap interest(320, 240);
+    ASSERT_TRUE(registration.expect({expected, kSpan_s}, &interest));
+    std::vector<FilteredEvent> come;
+    for (std::size_t i = 0; i < events_.size(); ++i) {
+      if (interest.holds(events_[i].x, events_[i].y)) come.push_back(events_[i]);
+      if (i % piece == 0) registration.look_at(come, kNow);
+    }
+    RegistrationProblem problem{come, kNow, kSpan_s, expected, covariance_};
+    problem.forecast = error;
+    const RegistrationResult r = registration.measure(problem);
+    EXPECT_NEAR(r.events, batch.events, 0.02 * batch.events) << piece;
+    EXPECT_NEAR(r.residual, batch.residual, 0.02 * batch.residual) << piece;
+    for (int i : {0, 1}) EXPECT_NEAR(solved(r, i) * kFocal, solved(batch, i) * kFocal, 0.01) << piece;
+  }
 }
 
 TEST_F(EventRegistrationLaws, BandsAreReleasedAfterEachCall) {

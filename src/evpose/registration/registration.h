@@ -3,11 +3,13 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "evpose/core/pose.h"
 #include "evpose/event/event_preprocessor.h"
+#include "evpose/event/interest_map.h"
 #include "evpose/registration/contour_view.h"
 
 namespace evpose {
@@ -29,6 +31,18 @@ enum class EventVerdict : std::uint8_t {
   predicted,       ///< used, and of the polarity that was predicted
 };
 
+/// What the next measurement will be made with, as far as is known before its events come.
+struct RegistrationForecast {
+  std::span<const ContourSample> samples;  ///< as they will be seen
+  double span_s;                           ///< until then
+};
+
+/// By how much the prediction differs from the forecast that its samples were made for.
+struct ForecastError {
+  Vector6d pose = Vector6d::Zero();                    ///< as Pose::plus
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< map frame, m/s
+};
+
 /// What one measurement is made from.
 struct RegistrationProblem {
   std::span<const FilteredEvent> events;  ///< kept since the last update
@@ -40,6 +54,8 @@ struct RegistrationProblem {
   const ContourView* view = nullptr;              ///< that the samples were made with
   Pose T_map_body = {};                           ///< the prediction
   std::vector<EventVerdict>* verdicts = nullptr;  ///< of each event, if asked for
+  std::optional<ForecastError> forecast =
+      {};  ///< the samples are those of expect(), which has seen all events
 };
 
 /// What one measurement says. Near the predicted pose its cost is d^T information d / 2 - vector^T d, with d
@@ -74,6 +90,13 @@ class Registration {
   virtual ~Registration() = default;
 
   virtual RegistrationResult measure(const RegistrationProblem& problem) = 0;
+
+  /// The events up to the next measurement may be looked at as they come. Marks where they matter; false if
+  /// they matter everywhere and only the measurement itself looks at them.
+  virtual bool expect(const RegistrationForecast&, InterestMap*) { return false; }
+  /// All events since expect(), those of the last call among them; `now_us`: time of the measurement.
+  virtual void look_at(std::span<const FilteredEvent>, std::uint32_t /*now_us*/) {}
+
   /// The pose comes from elsewhere: how well events met the contours until now does not count any more.
   virtual void restart() {}
   /// Whether `measure` wants the time surface.

@@ -8,7 +8,7 @@ namespace evpose {
 namespace {
 
 std::array<double, 5> stages_ms(const StageTimes& t) {
-  return {1e3 * t.events_s, 1e3 * t.predict_s, 1e3 * t.choose_s, 1e3 * t.register_s, 1e3 * t.fuse_s};
+  return {1e3 * t.choose_s, 1e3 * t.events_s, 1e3 * t.predict_s, 1e3 * t.register_s, 1e3 * t.fuse_s};
 }
 
 void append(std::string* row, double value) { append_csv(*row, value); }

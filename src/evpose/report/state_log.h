@@ -32,7 +32,8 @@ struct StateRow {
   bool valid() const { return health != Health::waiting && health != Health::lost; }
 };
 
-inline constexpr std::array<const char*, 5> kStageNames{"events", "predict", "choose", "register", "fuse"};
+inline constexpr std::array<const char*, 5> kStageNames{"choose", "events", "predict", "register", "fuse"};
+inline constexpr std::size_t kStagesBeforeThePose = 2;  ///< they are done when the newest event comes
 
 struct HealthChange {
   TimeNs t = 0;

@@ -127,7 +127,7 @@ std::optional<LatencySummary> summarise_latency(const StateLog& log) {
     for (std::size_t i = 0; i < stages.size(); ++i) {
       stages[i].push_back(row.stages_ms[i]);
       sum += row.stages_ms[i];
-      if (i > 0) after_newest_event += row.stages_ms[i];
+      if (i >= kStagesBeforeThePose) after_newest_event += row.stages_ms[i];
     }
     update.push_back(after_newest_event);
   }

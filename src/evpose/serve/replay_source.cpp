@@ -19,29 +19,6 @@ TimeNs now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count();
 }
 
-/// Uniform over the image and over the time from the packet's base to `until`, merged by time. Cheap, so that
-/// the load is the tracker's and not the generator's: one step of a 64-bit generator (Vigna's splitmix64) an
-/// event.
-void add_noise(EventPacket& packet, ImageSize size, TimeNs until, double per_s, std::uint64_t& state) {
-  const double span_s = to_seconds(until - packet.base);
-  const auto count = static_cast<std::size_t>(std::llround(per_s * span_s));
-  std::vector<Event> noise(count);
-  const double step_us = 1e6 * span_s / static_cast<double>(std::max<std::size_t>(count, 1));
-  for (std::size_t i = 0; i < count; ++i) {
-    std::uint64_t r = state += 0x9E3779B97F4A7C15;
-    r = (r ^ (r >> 30)) * 0xBF58476D1CE4E5B9;
-    r = (r ^ (r >> 27)) * 0x94D049BB133111EB;
-    const auto x = static_cast<int>((r >> 48) * static_cast<std::uint64_t>(size.width) >> 16);
-    const auto y = static_cast<int>((r >> 32 & 0xFFFF) * static_cast<std::uint64_t>(size.height) >> 16);
-    noise[i] =
-        make_event(static_cast<std::uint32_t>(step_us * static_cast<double>(i)), x, y, (r >> 31 & 1) == 1);
-  }
-  std::vector<Event> all(packet.events.size() + count);
-  std::merge(packet.events.begin(), packet.events.end(), noise.begin(), noise.end(), all.begin(),
-             [](const Event& a, const Event& b) { return a.dt_us < b.dt_us; });
-  packet.events = std::move(all);
-}
-
 /// Data time to the wall's; sleeps until it is due.
 class Pace {
  public:
@@ -75,6 +52,27 @@ StreamItem item_of(StreamItem::Kind kind, std::string words = "") {
 }
 
 }  // namespace
+
+void add_random_events(EventPacket& packet, ImageSize size, TimeNs until, double per_s,
+                       std::uint64_t& state) {
+  const double span_s = to_seconds(until - packet.base);
+  const auto count = static_cast<std::size_t>(std::llround(per_s * span_s));
+  std::vector<Event> noise(count);
+  const double step_us = 1e6 * span_s / static_cast<double>(std::max<std::size_t>(count, 1));
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint64_t r = state += 0x9E3779B97F4A7C15;
+    r = (r ^ (r >> 30)) * 0xBF58476D1CE4E5B9;
+    r = (r ^ (r >> 27)) * 0x94D049BB133111EB;
+    const auto x = static_cast<int>((r >> 48) * static_cast<std::uint64_t>(size.width) >> 16);
+    const auto y = static_cast<int>((r >> 32 & 0xFFFF) * static_cast<std::uint64_t>(size.height) >> 16);
+    noise[i] =
+        make_event(static_cast<std::uint32_t>(step_us * static_cast<double>(i)), x, y, (r >> 31 & 1) == 1);
+  }
+  std::vector<Event> all(packet.events.size() + count);
+  std::merge(packet.events.begin(), packet.events.end(), noise.begin(), noise.end(), all.begin(),
+             [](const Event& a, const Event& b) { return a.dt_us < b.dt_us; });
+  packet.events = std::move(all);
+}
 
 void describe(ConfigTable& table, ReplayConfig& c) {
   table.add("speed", c.speed, "", "data time against the wall clock; 0: as fast as it is taken", {0, 1000});
@@ -117,7 +115,7 @@ Status ReplaySource::run_once(StreamQueue& queue) {
     if (!pace) pace.emplace(config_.speed, packet.base);
     StreamItem events = item_of(StreamItem::Kind::events), samples = item_of(StreamItem::Kind::imu);
     if (config_.add_noise_mev_s > 0)
-      add_noise(packet, recording_.camera.size, end, 1e6 * config_.add_noise_mev_s, random);
+      add_random_events(packet, recording_.camera.size, end, 1e6 * config_.add_noise_mev_s, random);
     for (; has_sample && sample.t <= end;) {
       samples.imu.push_back(sample);
       if (auto ok = next_imu(); !ok) return ok;

@@ -16,6 +16,11 @@ struct ReplayConfig {
 };
 void describe(ConfigTable& table, ReplayConfig& config);
 
+/// Adds events uniformly over the image and over the time from the packet's base to `until`, merged by time.
+/// Cheap, so that the load is the tracker's and not the generator's: one step of a 64-bit generator (Vigna's
+/// splitmix64) an event. `state`: of the generator.
+void add_random_events(EventPacket& packet, ImageSize size, TimeNs until, double per_s, std::uint64_t& state);
+
 /// A recording as if it happened now: every packet and IMU sample comes when it would come from a camera.
 class ReplaySource : public Source {
  public:

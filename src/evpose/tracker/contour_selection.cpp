@@ -23,10 +23,15 @@ ContourSelection::ContourSelection(const ContourIndex& index, const ContourSegme
     : view_{index.map(), segments, camera, T_body_cam, map_sigma_m},
       visible_(index, choosing_camera, config, own_thread) {}
 
-void ContourSelection::choose(const FusionState& state, double span_s) {
-  const auto& chosen = visible_.choose(state.nav.T_map_body * view_.T_body_cam);
+double ContourSelection::largest_shift_px(const Vector6d& pose_change) const {
+  double largest = 0;
+  for (const ContourSample& s : samples_) largest = std::max(largest, std::abs(s.jacobian.dot(pose_change)));
+  return largest;
+}
+
+void ContourSelection::project(const FusionState& state, double span_s) {
   const BodyMotion motion{state.nav.T_map_body, state.nav.velocity, state.angular_rate};
-  project_contours(view_, chosen, motion, span_s, samples_);
+  project_contours(view_, visible_.chosen(), motion, span_s, samples_);
   const Eigen::Matrix3d velocity_covariance = state.covariance.block<3, 3>(error_state::kV, error_state::kV);
   const double rate_variance = state.covariance.block<3, 3>(error_state::kBg, error_state::kBg).trace() / 3;
   flows_px_s_.clear();

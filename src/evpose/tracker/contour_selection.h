@@ -21,9 +21,13 @@ class ContourSelection {
                    double map_sigma_m, bool own_thread);
 
   /// The first choice of points is the dearest: made before the data come.
-  void prepare(const Pose& T_map_body) { visible_.choose(T_map_body * view_.T_body_cam); }
-  /// Chooses the points that the camera should see at this state, and projects them over the last `span_s`.
-  void choose(const FusionState& state, double span_s);
+  void prepare(const Pose& T_map_body) { choose(T_map_body); }
+  /// Chooses the points that the camera should see at this pose and near it.
+  void choose(const Pose& T_map_body) { visible_.choose(T_map_body * view_.T_body_cam); }
+  /// Projects the chosen points at this state over the last `span_s`.
+  void project(const FusionState& state, double span_s);
+  /// By how much samples would move across their contours if the pose changed by this, px; the largest.
+  double largest_shift_px(const Vector6d& pose_change) const;
 
   std::span<const ContourSample> samples() const { return samples_; }
   std::span<const std::uint32_t> points() const { return visible_.chosen(); }

@@ -45,9 +45,11 @@ class PoseSupervisor {
   /// begins anew, once it is found.
   std::optional<FusionState> search(const RelocalizerInput& input, const BackEnd& fusion);
 
-  /// The events since the last update, and the contours where the pose has them.
-  void look(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s) {
-    verifier_.add(events, contours, span_s);
+  /// All events since the last update, which is `span_s` ago, and the contours where the pose has them;
+  /// `elapsed_s`: since the last look.
+  void look(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s,
+            double elapsed_s) {
+    verifier_.add(events, contours, span_s, elapsed_s);
   }
 
   /// Why the registration is not used; empty if it is.

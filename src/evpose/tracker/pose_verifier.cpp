@@ -12,7 +12,6 @@ namespace {
 constexpr std::array<double, 4> kAside_px{-12, -7, 7, 12};
 constexpr std::array<double, 2> kAlong_px{-1.5, 1.5};  // of a sample
 constexpr double kReach_px = 1;                        // events lie so near to their contour
-constexpr std::size_t kEvery = 4;                      // of the samples, others in each update
 
 // For how long it counts.
 constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while little moves
@@ -22,7 +21,7 @@ constexpr float kForgotten_px = 1e-2F;
 constexpr double kSigma = 2;  // by so much, and by chance, pieces have more events on them than beside
 
 // How much has to be seen, and of it.
-constexpr float kLeastWay_px = 0.25F;  // in the samples that are looked at: by a pixel in all
+constexpr float kLeastWay_px = 0.25F;  // in the looks: by a pixel in all
 constexpr double kFewestPieces = 20, kFewestEvents = 100;
 constexpr double kConfirmedRatio = 1.9, kConfirmedShare = 0.08;
 constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.055;
@@ -73,9 +72,9 @@ void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
   for (std::size_t k = 0; k < kDecoys; ++k) piece.beside[k] += beside[k];
 }
 
-void PoseVerifier::decay(double span_s) {
-  const auto keep = static_cast<float>(std::exp(-span_s / kMemory_s)),
-             keep_slow = static_cast<float>(std::exp(-span_s / kLongestMemory_s));
+void PoseVerifier::decay(double elapsed_s) {
+  const auto keep = static_cast<float>(std::exp(-elapsed_s / kMemory_s)),
+             keep_slow = static_cast<float>(std::exp(-elapsed_s / kLongestMemory_s));
   std::erase_if(seen_, [&](std::uint32_t i) {
     Piece& piece = pieces_[i];
     const float share = piece.way_px > kEnoughWay_px ? keep : keep_slow;
@@ -88,14 +87,14 @@ void PoseVerifier::decay(double span_s) {
 }
 
 void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours,
-                       double span_s) {
-  decay(span_s);
+                       double span_s, double elapsed_s) {
+  decay(elapsed_s);
   const auto count = [&](const FilteredEvent& e) -> std::uint8_t& {
     return counts_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
   };
   for (const FilteredEvent& e : events)
     if (count(e) < 255) ++count(e);
-  for (std::size_t i = ++updates_ % kEvery; i < contours.size(); i += kEvery) look_at(contours[i], span_s);
+  for (const ContourSample& contour : contours) look_at(contour, span_s);
   for (const FilteredEvent& e : events) count(e) = 0;
 }
 

@@ -35,8 +35,10 @@ class PoseVerifier {
 
   /// The pose comes from elsewhere: what was seen does not count any more.
   void restart();
-  /// One update: the events since the last one, and the contours at its time.
-  void add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s);
+  /// One update of several: all events of its span, and the contours at its time; `elapsed_s`: since the
+  /// last one that was looked at.
+  void add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s,
+           double elapsed_s);
 
   PoseEvidence evidence() const;
   PoseVerdict verdict() const;
@@ -48,7 +50,7 @@ class PoseVerifier {
     float on = 0;      ///< events
     std::array<float, kDecoys> beside{};
   };
-  void decay(double span_s);
+  void decay(double elapsed_s);
   void look_at(const ContourSample& contour, double span_s);
   int events_along(const ContourSample& contour, double aside_px, double span_s) const;
 
@@ -56,7 +58,6 @@ class PoseVerifier {
   std::vector<std::uint8_t> counts_;  ///< of this update's events, per pixel
   std::vector<Piece> pieces_;         ///< with exponential forgetting
   std::vector<std::uint32_t> seen_;   ///< pieces that something was seen of
-  std::size_t updates_ = 0;
 };
 
 }  // namespace evpose

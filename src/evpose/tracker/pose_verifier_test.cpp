@@ -12,6 +12,7 @@ namespace {
 
 using test_flight::pose_at;
 
+constexpr double kLook_s = 0.013;  // every few updates
 constexpr double kUpdate_s = 3e-3, kFlight_s = 0.3;
 
 class PoseVerifierLaws : public ::testing::Test {
@@ -33,12 +34,13 @@ class PoseVerifierLaws : public ::testing::Test {
     std::iota(points.begin(), points.end(), 0U);
     std::vector<ContourSample> samples;
     PoseVerifier verifier(camera_->size(), segments.count);
-    for (double t_s = kUpdate_s; t_s < kFlight_s; t_s += kUpdate_s) {
+    for (double t_s = kLook_s; t_s < kFlight_s; t_s += kLook_s) {
       const Eigen::Vector3d rate = test_flight::imu_at(t_s).gyro;
       project_contours(view, points, {pose_at(t_s).plus(off), test_flight::velocity_at(t_s), rate}, kUpdate_s,
                        samples);
       std::erase_if(samples, [](const ContourSample& s) { return !camera_->size().contains(s.pixel); });
-      verifier.add(silent ? std::vector<FilteredEvent>{} : between(t_s - kUpdate_s, t_s), samples, kUpdate_s);
+      verifier.add(silent ? std::vector<FilteredEvent>{} : between(t_s - kUpdate_s, t_s), samples, kUpdate_s,
+                   kLook_s);
     }
     return verifier.verdict();
   }

@@ -6,97 +6,19 @@
 
 #include "evpose/registration/contrast_memory.h"
 #include "evpose/tracker/pose_uncertainty.h"
+#include "evpose/tracker/tracker_parts.h"
 
 namespace evpose {
 namespace {
 
-double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
-  Eigen::Vector3f low = map.points.front().position, high = low;
-  for (const auto& q : map.points) low = low.cwiseMin(q.position), high = high.cwiseMax(q.position);
-  const Eigen::Vector3d relative = p - map.anchor;
-  return (low.cast<double>() - relative).cwiseMax(relative - high.cast<double>()).cwiseMax(0).norm();
-}
-
-/// As maps that are built from clouds do.
-bool states_errors(const ContourMap& map) {
-  const auto counts = [](const ContourPoint& point) { return !is_view_dependent(point.kind); };
-  const auto states = [](const ContourPoint& point) {
-    return !is_view_dependent(point.kind) && point.sigma > 0;
-  };
-  const auto& points = map.points;
-  return 2 * std::count_if(points.begin(), points.end(), states) >
-         std::count_if(points.begin(), points.end(), counts);
-}
-
-/// The temporal field has a spacing of points of its own.
-VisibleSetConfig visible_config(const TrackerConfig& config) {
-  VisibleSetConfig out = config.visible;
-  if (config.registration == RegistrationKind::temporal_field) out.stride_px = kFieldStride_px;
-  return out;
-}
-
-/// The sign that most points of a segment state.
-std::vector<int> contrast_of_segments(const ContourMap& map, const ContourSegments& segments) {
-  std::vector<int> sum(segments.count, 0);
-  for (std::size_t i = 0; i < map.points.size(); ++i) sum[segments.of_point[i]] += map.points[i].contrast;
-  for (int& sign : sum) sign = (sign > 0) - (sign < 0);
-  return sum;
-}
-
-/// With the signs of contrast that the map states.
-std::unique_ptr<Registration> make_registration(const TrackerConfig& config, ImageSize size,
-                                                const ContourMap& map, const ContourSegments& segments) {
-  const EventRegistrationConfig& events = config.event_registration;
-  const std::vector<int> contrast = contrast_of_segments(map, segments);
-  const auto seeded = [&](auto registration) -> std::unique_ptr<Registration> {
-    for (std::uint32_t i = 0; i < segments.count; ++i) registration->seed_contrast(i, contrast[i]);
-    return registration;
-  };
-  if (config.registration == RegistrationKind::events)
-    return seeded(std::make_unique<EventRegistration>(size, events, segments.count));
-  const PolarityConfig polarity{events.polarity, events.buffer_sigma};
-  return seeded(std::make_unique<TemporalFieldRegistration>(config.temporal_field, polarity, segments.count,
-                                                            config.threads));
-}
-
-Status check_start(const ContourMap& map, const StartState& start, double far_m) {
-  const Eigen::Vector3d& p = start.T_map_body.p;
-  if (!p.allFinite() || !start.T_map_body.q.coeffs().allFinite() || !start.velocity.allFinite())
-    return Error{"start pose", "not finite", "check --init"};
-  const double outside_m = distance_outside(map, p);
-  if (outside_m > far_m)
-    return Error{"start pose",
-                 text("(", p.x(), ", ", p.y(), ", ", p.z(), ") m is ", outside_m,
-                      " m off the map, which is seen up to ", far_m, " m"),
-                 "check that map and start pose share one frame (frames.T_map_world in recording.yaml)"};
-  return {};
-}
+// Contours that the prediction has moved by less since the forecast are moved along, others projected anew.
+constexpr double kForecastHolds_px = 0.25;
+// So often the events beside the contours count, too.
+constexpr TimeNs kLookAside = 13 * kNsPerMs;
 
 // Why an update measures nothing.
 const char* const kTimeIsPast = "the time offset has changed";  // by more than an update
 const char* const kAligning = "aligning the first view";
-
-/// What is uncertain of the calibration becomes a state. Without an IMU body and camera are one, and
-/// intrinsics of which nothing is stated count as known.
-void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
-  CalibrationConfig& c = fusion.calibration;
-  c.time_offset = c.rotation = c.translation = c.intrinsics = false;
-  if (!c.on || !setup.calibration_sigma || fusion.kind != BackEndKind::ekf) return;
-  const CalibrationSigma& sigma = *setup.calibration_sigma;
-  c.start_time_sigma_s = sigma.of_time_s();
-  c.start_rotation_sigma_rad = sigma.of_rotation_rad();
-  c.start_translation_sigma_m = sigma.of_translation_m();
-  if (setup.motion == MotionModel::imu) {
-    c.time_offset = c.start_time_sigma_s > 0;
-    c.rotation = (c.start_rotation_sigma_rad.array() > 0).any();
-    c.translation = (c.start_translation_sigma_m.array() > 0).any();
-  }
-  // Held by constant velocity alone, the pose is too loose to tell the camera from nothing that was stated.
-  const bool held = setup.motion == MotionModel::imu || sigma.intrinsics || sigma.distortion;
-  if (!setup.intrinsics || !held) return;
-  c.start_intrinsics_sigma = sigma.of_intrinsics(*setup.intrinsics);
-  c.intrinsics = (c.start_intrinsics_sigma.array() > 0).any();
-}
 
 }  // namespace
 
@@ -138,6 +60,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       contours_(index_, segments_, *setup_.camera, adjusted_ ? adjusted_->given() : *setup_.camera,
                 T_body_cam_, visible_config(config), config.event_registration.map_sigma_m,
                 config.threads > 1),
+      interest_(setup_.camera->size().width, setup_.camera->size().height),
       preprocessor_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
@@ -150,7 +73,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       reporter_(std::move(clock)),
       start_t_(start.t),
       last_update_(start.t),
-      next_update_(start.t + from_seconds(1 / config.rate_hz)) {
+      next_update_(start.t + from_seconds(1 / config.rate_hz)),
+      last_look_aside_(start.t) {
   if (config.fusion.segment_offsets == SegmentOffsetUse::on)
     offset_segments_ = cut_into_segments(*setup_.map, config.fusion.segments.length_m).of_point;
   keep_time_surface(false);
@@ -164,6 +88,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
                          config.visible, config.event_registration},
         adjusted_.get());
   contours_.prepare(start.T_map_body);
+  prepare_update();
 }
 
 void Tracker::add_imu(const ImuSample& sample) {
@@ -178,8 +103,15 @@ void Tracker::add_events(const EventPacket& packet) {
   input_.keep_rest();
 }
 
+/// True if a later event proves that all events up to t were here.
+bool Tracker::feed_until(TimeNs t) {
+  const bool all = input_.feed_until(t);
+  if (forecast_) registration_->look_at(preprocessor_.kept(), preprocessor_.stamp(t));
+  return all;
+}
+
 void Tracker::make_due_updates() {
-  while (input_.feed_until(next_update_) &&
+  while (feed_until(next_update_) &&
          (imu_.reaches(imu_time(next_update_)) || input_.newest() > next_update_ + ImuGate::kPatience))
     make_update();
 }
@@ -195,9 +127,51 @@ void Tracker::make_update() {
   update_number_ += update_stride_;
   next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
   if (update_callback_) update_callback_(result);
-  if (setup_.motion != MotionModel::imu) return;
-  imu_rate_output_.restart(fusion_->reported_state(), imu_.reading());
-  imu_rate_output_.report_until(imu_time(next_update_), *fusion_, imu_);
+  if (setup_.motion == MotionModel::imu) {
+    imu_rate_output_.restart(fusion_->reported_state(), imu_.reading());
+    imu_rate_output_.report_until(imu_time(next_update_), *fusion_, imu_);
+  }
+  prepare_update();
+}
+
+/// The state at the next update if nothing changes.
+FusionState Tracker::forecast() const {
+  FusionState state = fusion_->state();
+  const double dt = to_seconds(imu_time(next_update_) - state.t);
+  NavState& nav = state.nav;
+  nav.T_map_body = {(nav.T_map_body.q * so3::exp(dt * state.angular_rate)).normalized(),
+                    nav.T_map_body.p + dt * nav.velocity};
+  return state;
+}
+
+/// Once a pose is out, before the next events come: points, their bands, and where events matter.
+void Tracker::prepare_update() {
+  const double began_s = reporter_.now_s();
+  forecast_.reset();
+  interest_.clear();
+  contours_.choose(fusion_->state().nav.T_map_body);
+  if (update_number_ > 0 && !supervisor_.searching() && !start_alignment_) {
+    const FusionState coming = forecast();
+    const double span_s = to_seconds(next_update_ - last_update_);
+    contours_.project(coming, span_s);
+    if (registration_->expect({contours_.samples(), span_s}, &interest_)) forecast_ = coming.nav;
+  }
+  looks_aside_ = next_update_ >= last_look_aside_ + kLookAside;
+  // Verdicts are asked for of all events; search, alignment and verification look at all of them.
+  const bool all = !forecast_ || verdict_callback_ || looks_aside_;
+  preprocessor_.set_interest(all ? nullptr : &interest_);
+  reporter_.add_preparation(reporter_.now_s() - began_s);
+}
+
+/// The contours as the prediction has them, unless they are as the forecast had them but for a small change.
+void Tracker::see_contours(double span_s) {
+  const FusionState& state = fusion_->state();
+  if (forecast_) {
+    const Vector6d change = state.nav.T_map_body.minus(forecast_->T_map_body);
+    if (contours_.largest_shift_px(change) < kForecastHolds_px) return;
+  }
+  forecast_.reset();
+  contours_.project(state, span_s);
 }
 
 Update Tracker::update(TimeNs t) {
@@ -206,9 +180,8 @@ Update Tracker::update(TimeNs t) {
   const TimeNs from = fusion_->state().t, until = std::max(imu_time(t), from);
   const ImuIncrement moved = imu_.predict(*fusion_, until);  // eq. (2), (4)
   search_pose(t, moved);
+  see_contours(span_s);
   reporter_.end_stage(&StageTimes::predict_s);
-  contours_.choose(fusion_->state(), span_s);  // EV-Pose 5.3
-  reporter_.end_stage(&StageTimes::choose_s);
   const bool aligning = align_start(t, moved);
   const RegistrationResult stpe =
       supervisor_.searching() || aligning ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
@@ -235,6 +208,7 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   fusion_->start(*found);
   registration_->restart();
   imu_.restart_comparison();
+  contours_.choose(found->nav.T_map_body);
 }
 
 /// While the first view of a camera whose calibration is uncertain is aligned, nothing else is measured.
@@ -269,7 +243,9 @@ void Tracker::take_calibration() {
 }
 
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
-  supervisor_.look(preprocessor_.kept(), contours_.samples(), span_s);
+  if (looks_aside_)
+    supervisor_.look(preprocessor_.kept(), contours_.samples(), span_s,
+                     to_seconds(t - std::exchange(last_look_aside_, t)));
   const Matrix6d covariance = fusion_->measured_covariance();
   RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(),
                               covariance};
@@ -277,6 +253,10 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   problem.view = &contours_.view();
   problem.T_map_body = fusion_->state().nav.T_map_body;
   if (verdict_callback_) problem.verdicts = &verdicts_;
+  if (forecast_) {
+    const NavState& now = fusion_->state().nav;
+    problem.forecast = {now.T_map_body.minus(forecast_->T_map_body), now.velocity - forecast_->velocity};
+  }
   RegistrationResult result = registration_->measure(problem);
   if (verdict_callback_ && verdicts_.size() == preprocessor_.kept().size())
     verdict_callback_(preprocessor_.kept(), verdicts_);

@@ -64,7 +64,7 @@ class Tracker {
   /// Called for each IMU sample, in order of time, with the state at it (ImuRateOutput).
   void on_state(ImuRateOutput::Callback callback) { imu_rate_output_.set_callback(std::move(callback)); }
   /// Called within each update with the events since the last one that passed the filter and what the
-  /// registration made of them (registration.kind: events).
+  /// registration made of them (registration.kind: events). To be set before any data come.
   using VerdictCallback = std::function<void(std::span<const FilteredEvent>, std::span<const EventVerdict>)>;
   void on_verdicts(VerdictCallback callback) { verdict_callback_ = std::move(callback); }
 
@@ -98,7 +98,11 @@ class Tracker {
           std::shared_ptr<AdjustedCamera> adjusted, std::unique_ptr<BackEnd> fusion);
 
   void make_due_updates();
+  bool feed_until(TimeNs t);
   void make_update();
+  void prepare_update();
+  FusionState forecast() const;
+  void see_contours(double span_s);
   TimeNs imu_time(TimeNs t) const;  ///< of an instant of the camera's clock
 
   // The stages of an update.
@@ -120,6 +124,8 @@ class Tracker {
   ContourIndex index_;
   ContourSegments segments_;  ///< of the map, for the contrast
   ContourSelection contours_;
+  std::optional<NavState> forecast_;  ///< that the contours were projected at, and events are looked at with
+  InterestMap interest_;
   EventPreprocessor preprocessor_;
   InputQueue input_;
   ImuGate imu_;
@@ -138,6 +144,8 @@ class Tracker {
   std::vector<std::uint32_t> offset_segments_;  ///< of each map point, where segments have offsets
 
   TimeNs start_t_, last_update_, next_update_;
+  TimeNs last_look_aside_;    ///< of the pose supervisor, when it last verified the pose
+  bool looks_aside_ = false;  ///< it does at the next update
   std::int64_t update_number_ = 0, update_stride_ = 1;
 };
 

@@ -16,12 +16,12 @@ const char* to_string(Health health);
 /// Wall time of one update by stage, seconds. Filled by the tracker from a clock that the driver hands in;
 /// nothing in the estimate depends on it.
 struct StageTimes {
-  double events_s = 0;    ///< noise filter and time surfaces, of the events since the last update
+  double choose_s = 0;    ///< choice of points and their bands, before the events came
+  double events_s = 0;    ///< the events since the last update, as they came
   double predict_s = 0;   ///< IMU or constant-velocity propagation
-  double choose_s = 0;    ///< visible set
-  double register_s = 0;  ///< alignment of the points with the field
+  double register_s = 0;  ///< alignment of the points with the events
   double fuse_s = 0;      ///< Kalman update and judgement
-  double after_newest_event_s() const { return predict_s + choose_s + register_s + fuse_s; }
+  double after_newest_event_s() const { return predict_s + register_s + fuse_s; }
 };
 
 /// Everything the tracker says about one instant: a row of states.csv.

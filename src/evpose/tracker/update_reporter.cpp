@@ -7,6 +7,7 @@ namespace evpose {
 
 void UpdateReporter::begin(double events_s) {
   update_ = {};
+  update_.times.choose_s = prepared_s_;
   update_.times.events_s = events_s;
   if (clock_) stage_began_s_ = clock_();
 }

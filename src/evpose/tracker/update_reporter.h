@@ -14,6 +14,10 @@ class UpdateReporter {
  public:
   explicit UpdateReporter(StageClock clock) : clock_(std::move(clock)) {}
 
+  /// Of the clock that the driver handed in; 0 without one.
+  double now_s() const { return clock_ ? clock_() : 0; }
+  /// Time that was spent before the events of the next update came.
+  void add_preparation(double seconds) { prepared_s_ = seconds; }
   /// `events_s`: time spent on the events since the last update.
   void begin(double events_s);
   /// The stage that began with begin() or with the end of the last one is done.
@@ -32,7 +36,7 @@ class UpdateReporter {
 
  private:
   StageClock clock_;
-  double stage_began_s_ = 0;
+  double stage_began_s_ = 0, prepared_s_ = 0;
   EventPreprocessor::Counts counted_;  ///< at the last update
   Update update_;
 };

@@ -16,8 +16,7 @@ constexpr const char* kHealths[] = {"waiting", "initialising", "tracking", "degr
 
 /// From the newest event to the pose; NAN where the row does not tell.
 double delay_ms(CsvRow times) {
-  const double sum = times.number("predict_ms") + times.number("choose_ms") + times.number("register_ms") +
-                     times.number("fuse_ms");
+  const double sum = times.number("predict_ms") + times.number("register_ms") + times.number("fuse_ms");
   return times.sound() ? sum : NAN;
 }
 

@@ -101,7 +101,8 @@ void LookCounter::add(const RegistrationProblem& p, double t_s, const EventRegis
   for (std::size_t k = 0; k < p.samples.size(); ++k)
     if (std::abs(p.samples[k].speed_px_s) >= kLeastSpeed_px_s && stands_alone(k, p))
       of_sample_[k] = &add_sample(p.samples[k], block, registration);
-  index_.find_all(p.events, p.now_us, &found_);
+  found_.clear();
+  index_.find_all(p.events, 0, p.now_us, &found_);
   for (const auto& [event, owner] : found_) {
     const auto sample = static_cast<std::size_t>(owner.band);
     if (of_sample_[sample] == nullptr) continue;

@@ -63,7 +63,8 @@ class PosedRegistration {
     state.t = t;
     state.nav = {at.T_map_body, at.velocity};
     state.angular_rate = at.angular_rate_body;
-    contours_.choose(state, to_seconds(span));
+    contours_.choose(state.nav.T_map_body);
+    contours_.project(state, to_seconds(span));
     const RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), to_seconds(span),
                                       contours_.samples(), no_covariance_};
     if (span > 0) {

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a tracker is made of, from what it is told.
+#pragma once
+
+#include <memory>
+
+#include "evpose/core/error.h"
+#include "evpose/tracker/tracker.h"
+
+namespace evpose {
+
+/// Whether most contours come with an error of theirs, as in maps that are built from clouds.
+bool states_errors(const ContourMap& map);
+
+/// The temporal field has a spacing of points of its own.
+VisibleSetConfig visible_config(const TrackerConfig& config);
+
+std::unique_ptr<Registration> make_registration(const TrackerConfig& config, ImageSize size,
+                                                const ContourMap& map, const ContourSegments& segments);
+
+/// Error: not finite, or further than `far_m` from the map.
+Status check_start(const ContourMap& map, const StartState& start, double far_m);
+
+/// What is uncertain of the calibration becomes a state. Without an IMU body and camera are one, and
+/// intrinsics of which nothing is stated count as known.
+void choose_states(const TrackerSetup& setup, FusionConfig& fusion);
+
+}  // namespace evpose

@@ -9,7 +9,8 @@
 namespace evpose {
 namespace {
 
-constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
+constexpr double kPatience_s = 0.5;   // lost, or with a pose that is not consistent with the map: then search
+constexpr double kConfirmed_s = 0.1;  // a few pieces of contours agree by chance for a moment
 constexpr double kContradicted_s = 0.05;  // by chance, few contours have events for so long
 constexpr double kHopeless_s = 1;         // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
@@ -47,22 +48,16 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   verify_until_ = input.t + from_seconds(Relocalizer::kVerify_s);
   verifier_.restart();
   verified_ = false;
-  contradicted_s_ = 0;
+  confirmed_s_ = contradicted_s_ = 0;
   return state;
 }
 
 void PoseSupervisor::take_verdict(double span_s) {
-  switch (verifier_.verdict()) {
-    case PoseVerdict::confirmed:
-      verified_ = true;
-      contradicted_s_ = 0;
-      break;
-    case PoseVerdict::refuted:
-      contradicted_s_ += span_s;
-      break;
-    case PoseVerdict::open:
-      break;
-  }
+  const PoseVerdict verdict = verifier_.verdict();
+  confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + span_s : 0;
+  if (verdict == PoseVerdict::confirmed) contradicted_s_ = 0;
+  if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
+  verified_ |= confirmed_s_ > kConfirmed_s;
 }
 
 bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }

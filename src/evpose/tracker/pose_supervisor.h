@@ -87,6 +87,7 @@ class PoseSupervisor {
   TimeNs verify_until_ = 0;    ///< a pose that was found is watched until then; 0: none
   double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map
   double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
+  double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it
   bool verified_ = false;      ///< the events have confirmed the pose since it was given or found
 };
 

@@ -12,6 +12,7 @@ namespace {
 constexpr std::array<double, 4> kAside_px{-12, -7, 7, 12};
 constexpr std::array<double, 2> kAlong_px{-1.5, 1.5};  // of a sample
 constexpr double kReach_px = 1;                        // events lie so near to their contour
+constexpr int kFewestFree = 2;                         // of places beside: no other contour crosses them
 
 // For how long it counts.
 constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while little moves
@@ -23,14 +24,18 @@ constexpr double kSigma = 2;  // by so much, and by chance, pieces have more eve
 // How much has to be seen, and of it.
 constexpr float kLeastWay_px = 0.25F;  // in the looks: by a pixel in all
 constexpr double kFewestPieces = 20, kFewestEvents = 100;
-constexpr double kConfirmedRatio = 1.9, kConfirmedShare = 0.08;
-constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.055;
+constexpr double kConfirmedRatio = 2.3;
+constexpr double kConfirmedRatioUnhidden = 1.9;  // contours behind surfaces have no events, but count
+constexpr double kConfirmedShare = 0.2, kRatioOfShare = 1.4;  // where texture has events beside them
+constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
 
 }  // namespace
 
-PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces)
+PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides)
     : size_(size),
+      confirmed_ratio_(map_hides ? kConfirmedRatio : kConfirmedRatioUnhidden),
       counts_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
+      taken_(counts_.size()),
       pieces_(pieces) {}
 
 void PoseVerifier::restart() {
@@ -38,38 +43,55 @@ void PoseVerifier::restart() {
   seen_.clear();
 }
 
-/// Events where the contour was since the last update, had it been moved aside; negative: it leaves the
-/// image.
-int PoseVerifier::events_along(const ContourSample& s, double aside_px, double span_s) const {
+/// Calls `visit` with the pixels where the contour was since the last update, had it been moved aside; false:
+/// it leaves the image.
+template <typename Visit>
+bool PoseVerifier::along(const ContourSample& s, double aside_px, double span_s, Visit visit) const {
   const Eigen::Vector2d tangent(-s.normal_px.y(), s.normal_px.x());
   const double back_px = -s.speed_px_s * span_s;
   const double from = std::min(0.0, back_px) - kReach_px, to = std::max(0.0, back_px) + kReach_px;
   const int steps = static_cast<int>(std::ceil(to - from));
-  int sum = 0;
   for (const double along : kAlong_px)
     for (int i = 0; i <= steps; ++i) {
       const double across = aside_px + from + (to - from) * i / steps;
       const Eigen::Vector2d at = s.pixel + across * s.normal_px + along * tangent;
-      if (!size_.contains(at, 1)) return -1;
+      if (!size_.contains(at, 1)) return false;
       const auto x = static_cast<std::size_t>(at.x() + 0.5), y = static_cast<std::size_t>(at.y() + 0.5);
-      sum += counts_[y * static_cast<std::size_t>(size_.width) + x];
+      visit(y * static_cast<std::size_t>(size_.width) + x);
     }
-  return sum;
+  return true;
+}
+
+/// Events where the contour was, had it been moved aside; nothing if it leaves the image.
+std::optional<PoseVerifier::Look> PoseVerifier::look(const ContourSample& contour, double aside_px,
+                                                     double span_s) const {
+  Look out;
+  const bool inside = along(contour, aside_px, span_s, [&](std::size_t i) {
+    out.events += counts_[i];
+    out.crossed |= taken_[i] != 0;
+  });
+  return inside ? std::optional(out) : std::nullopt;
 }
 
 void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
-  const int on = events_along(contour, 0, span_s);
-  if (on < 0) return;
-  std::array<float, kDecoys> beside;
+  const auto on = look(contour, 0, span_s);
+  if (!on) return;
+  std::array<Look, kDecoys> beside;
+  float sum = 0;
+  int free = 0;
   for (std::size_t k = 0; k < kDecoys; ++k) {
-    beside[k] = static_cast<float>(events_along(contour, kAside_px[k], span_s));
-    if (beside[k] < 0) return;
+    const auto there = look(contour, kAside_px[k], span_s);
+    if (!there) return;
+    beside[k] = *there;
+    if (!there->crossed) sum += there->events, ++free;
   }
+  if (free < kFewestFree) return;
   Piece& piece = pieces_[contour.segment];
   if (piece.way_px == 0) seen_.push_back(contour.segment);
   piece.way_px += static_cast<float>(std::abs(contour.speed_px_s) * span_s) + 1e-6F;
-  piece.on += static_cast<float>(on);
-  for (std::size_t k = 0; k < kDecoys; ++k) piece.beside[k] += beside[k];
+  piece.on += on->events;
+  for (std::size_t k = 0; k < kDecoys; ++k)  // another contour's events say nothing of this one
+    piece.beside[k] += beside[k].crossed ? sum / static_cast<float>(free) : beside[k].events;
 }
 
 void PoseVerifier::decay(double elapsed_s) {
@@ -94,7 +116,10 @@ void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const Co
   };
   for (const FilteredEvent& e : events)
     if (count(e) < 255) ++count(e);
+  for (const ContourSample& contour : contours)
+    along(contour, 0, span_s, [this](std::size_t i) { taken_[i] = 1; });
   for (const ContourSample& contour : contours) look_at(contour, span_s);
+  std::fill(taken_.begin(), taken_.end(), std::uint8_t{0});
   for (const FilteredEvent& e : events) count(e) = 0;
 }
 
@@ -124,7 +149,8 @@ PoseEvidence PoseVerifier::evidence() const {
 PoseVerdict PoseVerifier::verdict() const {
   const PoseEvidence e = evidence();
   if (e.pieces == 0) return PoseVerdict::open;
-  if (e.ratio > kConfirmedRatio || e.explained > kConfirmedShare) return PoseVerdict::confirmed;
+  if (e.ratio > confirmed_ratio_ || (e.explained > kConfirmedShare && e.ratio > kRatioOfShare))
+    return PoseVerdict::confirmed;
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,8 +31,8 @@ struct PoseEvidence {
 /// the events has some contours on edges of the image; most are where there is none.
 class PoseVerifier {
  public:
-  /// `pieces`: number of the map's contrast segments.
-  PoseVerifier(ImageSize size, std::uint32_t pieces);
+  /// `pieces`: number of the map's contrast segments; `map_hides`: it has surfaces that hide contours.
+  PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides);
 
   /// The pose comes from elsewhere: what was seen does not count any more.
   void restart();
@@ -51,11 +52,19 @@ class PoseVerifier {
     std::array<float, kDecoys> beside{};
   };
   void decay(double elapsed_s);
+  struct Look {
+    float events = 0;
+    bool crossed = false;  ///< by a contour
+  };
+  std::optional<Look> look(const ContourSample& contour, double aside_px, double span_s) const;
   void look_at(const ContourSample& contour, double span_s);
-  int events_along(const ContourSample& contour, double aside_px, double span_s) const;
+  template <typename Visit>
+  bool along(const ContourSample& contour, double aside_px, double span_s, Visit visit) const;
 
   ImageSize size_;
+  double confirmed_ratio_;            ///< of events on contours to those beside
   std::vector<std::uint8_t> counts_;  ///< of this update's events, per pixel
+  std::vector<std::uint8_t> taken_;   ///< pixels on contours of this update
   std::vector<Piece> pieces_;         ///< with exponential forgetting
   std::vector<std::uint32_t> seen_;   ///< pieces that something was seen of
 };

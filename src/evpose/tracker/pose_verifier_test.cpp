@@ -33,7 +33,7 @@ class PoseVerifierLaws : public ::testing::Test {
     std::vector<std::uint32_t> points(map.points.size());
     std::iota(points.begin(), points.end(), 0U);
     std::vector<ContourSample> samples;
-    PoseVerifier verifier(camera_->size(), segments.count);
+    PoseVerifier verifier(camera_->size(), segments.count, false);
     for (double t_s = kLook_s; t_s < kFlight_s; t_s += kLook_s) {
       const Eigen::Vector3d rate = test_flight::imu_at(t_s).gyro;
       project_contours(view, points, {pose_at(t_s).plus(off), test_flight::velocity_at(t_s), rate}, kUpdate_s,

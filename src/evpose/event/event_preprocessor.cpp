@@ -79,9 +79,10 @@ void EventPreprocessor::take_where(std::span<const Event> events, std::int64_t b
     std::size_t count = 0, inside = 0;
     const std::size_t end = std::min(begin + kBlock, events.size());
     for (std::size_t i = begin; i < end; ++i) {
-      const bool in_image = (events[i].x < width_) & (events[i].y < height_);
+      const auto in_image =
+          static_cast<std::size_t>(events[i].x < width_) & static_cast<std::size_t>(events[i].y < height_);
       block[count] = stamped(events[i], base_us);
-      count += in_image & matters(events[i]);
+      count += in_image & static_cast<std::size_t>(matters(events[i]));
       inside += in_image;
     }
     counts_.outside += static_cast<std::int64_t>(end - begin - inside);

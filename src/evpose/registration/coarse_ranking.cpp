@@ -93,7 +93,7 @@ double CoarseScores::score(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) c
     const float dv = R(1, 0) * tx[i] + R(1, 1) * ty[i] + R(1, 2) * tz[i] - v * dz;
     const float a = std::abs(du), b = std::abs(dv);
     const float turn = (du * dv >= 0 ? b : 2 * a + b) / std::max(a + b, 1e-12F);  // 0 .. 2, as direction_of()
-    const int direction = static_cast<int>(0.5F * kDirections * turn + 0.5F) & (kDirections - 1);
+    const int direction = static_cast<int>(0.5F * (kDirections * turn + 1)) & (kDirections - 1);
     const float column = std::min(std::max(u * cells_per_unit_ + half_width_, -1.0F), columns + 1),
                 row = std::min(std::max(v * cells_per_unit_ + half_height_, -1.0F), rows + 1);
     const bool inside = z > kNearest_m && column >= 0 && row >= 0 && column < columns && row < rows;

@@ -9,8 +9,8 @@
 namespace evpose {
 namespace {
 
-constexpr double kPatience_s = 0.5;   // lost, or with a pose that is not consistent with the map: then search
-constexpr double kConfirmed_s = 0.1;  // a few pieces of contours agree by chance for a moment
+constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
+constexpr double kConfirmed_s = 0.013;    // two looks: a few pieces of contours agree by chance for a moment
 constexpr double kContradicted_s = 0.05;  // by chance, few contours have events for so long
 constexpr double kHopeless_s = 1;         // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.

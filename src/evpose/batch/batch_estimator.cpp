@@ -71,7 +71,6 @@ Status BatchEstimator::filter(const TrackRequest& request, const Progress& progr
   return check_view(job_, updates_);
 }
 
-/// The job with the calibration as it is known now.
 TrackJob BatchEstimator::at_present_values() const {
   const Calibration& found = parameters_->calibration();
   TrackJob out = job_;

@@ -34,10 +34,11 @@ class BatchEstimator {
   /// Of the last pass: what was measured, at the trajectory before it.
   const std::vector<Update>& updates() const { return updates_; }
   const RunSummary& summary() const { return summary_; }
+  /// The job with the calibration as it is known now.
+  TrackJob at_present_values() const;
 
  private:
   Expected<std::unique_ptr<Tracker>> follow(const Progress& progress);
-  TrackJob at_present_values() const;
   double correct();
 
   TrackJob job_;

@@ -26,6 +26,7 @@ DepthBuffer::DepthBuffer(const Eigen::Vector2d& tangents, double cell)
 void DepthBuffer::reset_view(const ContourMap& map, const Pose& T_map_cam, double near_m) {
   std::fill(inverse_depths_.begin(), inverse_depths_.end(), 0.0F);
   slopes_.clear();
+  triangles_.clear();
   const Pose T_cam_map = T_map_cam.inverse();
   R_cam_map_ = T_cam_map.rotation().cast<float>();
   offset_ = (T_cam_map * map.anchor).cast<float>();
@@ -40,6 +41,7 @@ std::size_t DepthBuffer::draw(const ContourMap& map, std::span<const std::uint32
     for (std::size_t k = 0; k < 3; ++k)
       corners[k] = R_cam_map_ * mesh.vertices[mesh.triangles[number][k]] + offset_;
     filled += clip_and_draw(corners);
+    triangles_.resize(slopes_.size(), number);
   }
   return filled;
 }
@@ -132,6 +134,16 @@ bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
       if (around && slopes_[surfaces_[at]].dot(ray) * (z - kSlack_m - kSlackShare * z) > 1) return true;
     }
   return false;
+}
+
+std::optional<std::uint32_t> DepthBuffer::triangle_at(const Eigen::Vector2f& tangents) const {
+  const auto column = static_cast<int>(std::floor((tangents.x() + tangents_.x()) / cell_));
+  const auto row = static_cast<int>(std::floor((tangents.y() + tangents_.y()) / cell_));
+  if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return std::nullopt;
+  const std::size_t at =
+      static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
+  if (!(inverse_depths_[at] > 0)) return std::nullopt;
+  return triangles_[surfaces_[at]];
 }
 
 }  // namespace evpose

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,6 +32,10 @@ class DepthBuffer {
   /// much nearer silhouette count as hidden: which of the two an event belongs to is open.
   bool hides(const Eigen::Vector3d& point_cam) const;
 
+  /// The triangle that is seen at (x / z, y / z), by its number in the map, at the nearest cell; none: nothing
+  /// is.
+  std::optional<std::uint32_t> triangle_at(const Eigen::Vector2f& tangents) const;
+
  private:
   std::size_t draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);
   std::size_t clip_and_draw(const Eigen::Vector3f* corners);
@@ -42,6 +47,7 @@ class DepthBuffer {
   std::vector<std::uint32_t> surfaces_;  ///< its number
   /// Of the surfaces: at (x / z, y / z) its 1 / z is slope . (x / z, y / z, 1).
   std::vector<Eigen::Vector3f> slopes_;
+  std::vector<std::uint32_t> triangles_;  ///< of the surfaces, in the map
   Eigen::Matrix3f R_cam_map_;
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame
   float near_m_ = 0;

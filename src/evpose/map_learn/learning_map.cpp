@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_learn/learning_map.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace evpose::map_learn {
+namespace {
+
+// Of what a cloud's map says of a contour, beside the sigma that it states.
+constexpr double kContour_m = 2e-3;   // across it: some stand on another edge, and count less then
+constexpr double kSurface_m = 1e-3;   // of a rim along the normal of its face
+constexpr double kOffPlane_m = 0.5e-3;  // of a marking from its plane's mean: prints, bent faces
+constexpr double kPlane_m = 0.5e-3;     // of a plane's offset
+constexpr double kFree_m = 0.1;         // of a marking along its plane: nothing is known
+// What is not in the adjustment's covariance: light and shade beside an edge, a tangent that leans.
+constexpr double kFloor_m = 0.3e-3;
+
+// What a landmark has to show.
+constexpr int kLeastObservations = 5;  // a quarter of a second
+constexpr double kWorstChi2 = 3;
+constexpr double kLargestDelay_px = 0.25;
+constexpr double kLargestSigma_m = 3e-3;
+constexpr double kLargestHeight_m = 2e-3;  // of a marking over its plane
+
+}  // namespace
+
+LearningMap::LearningMap(const ContourMap& given) : map_(given), planes_moved_m_(given.planes.size(), 0) {
+  std::int32_t next = next_contour();
+  for (ContourPoint& p : map_.points) {
+    if (p.contour < 0 && p.kind == ContourKind::marking) p.contour = next++;
+    records_.push_back({p.position, p.sigma, false, false});
+  }
+}
+
+std::int32_t LearningMap::next_contour() const {
+  std::int32_t next = 0;
+  for (const ContourPoint& p : map_.points) next = std::max(next, p.contour + 1);
+  return next;
+}
+
+void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
+  for (const ContourPoint& p : points) {
+    map_.points.push_back(p);
+    records_.push_back({p.position, p.sigma, true, false});
+  }
+}
+
+std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) const {
+  std::vector<Landmark> out(segments.count);
+  std::vector<Eigen::Vector3d> moved(segments.count, Eigen::Vector3d::Zero()), tangent = moved, normal = moved;
+  std::vector<double> points(segments.count, 0), sigma(segments.count, 0);
+  std::vector<const Record*> record(segments.count, nullptr);
+  std::vector<const ContourPoint*> example(segments.count, nullptr);
+  for (std::size_t i = 0; i < map_.points.size(); ++i) {
+    const std::uint32_t s = segments.of_point[i];
+    const ContourPoint& p = map_.points[i];
+    if (example[s] == nullptr) example[s] = &p, record[s] = &records_[i];
+    const double sign = example[s]->tangent.dot(p.tangent) < 0 ? -1 : 1;
+    moved[s] += (p.position - records_[i].given).cast<double>();
+    tangent[s] += sign * p.tangent.cast<double>();
+    normal[s] += p.normal.cast<double>();
+    sigma[s] += static_cast<double>(records_[i].given_sigma);
+    points[s] += 1;
+  }
+  for (std::uint32_t s = 0; s < segments.count; ++s) {
+    Landmark& l = out[s];
+    const Eigen::Vector3d t = tangent[s].normalized();
+    Eigen::Vector3d n = normal[s] - normal[s].dot(t) * t;
+    n = n.norm() > 0.1 * points[s] ? n.normalized() : t.unitOrthogonal();
+    l.directions << n, t.cross(n);
+    Eigen::Vector3d by_own = moved[s] / points[s];
+    const double stated = sigma[s] / points[s];
+    const bool marking = example[s]->kind == ContourKind::marking && example[s]->plane_a >= 0;
+    if (marking) {
+      l.plane = example[s]->plane_a;
+      const auto plane = static_cast<std::size_t>(l.plane);
+      by_own -= planes_moved_m_[plane] * map_.planes[plane].normal.cast<double>();
+      l.sigma_m = {record[s]->is_new ? kFree_m : stated, kOffPlane_m};
+      l.doubtful = !record[s]->is_new;
+    } else {
+      const double across = std::hypot(stated, kContour_m);
+      l.sigma_m = {across, example[s]->kind == ContourKind::boundary ? std::hypot(stated, kSurface_m) : across};
+    }
+    l.moved_m = l.directions.transpose() * by_own;
+  }
+  return out;
+}
+
+std::vector<PlaneError> LearningMap::planes() const {
+  std::vector<PlaneError> out;
+  for (std::size_t i = 0; i < map_.planes.size(); ++i)
+    out.push_back({map_.planes[i].normal.cast<double>(), planes_moved_m_[i], kPlane_m});
+  return out;
+}
+
+namespace {
+
+enum class Verdict { untold, good, wrong };
+
+/// What the events say of a landmark.
+Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool contrast_is_known) {
+  if (e.observations < kLeastObservations) return Verdict::untold;
+  const bool sure = e.chi2 < kWorstChi2 && std::abs(e.delay_px) < kLargestDelay_px;
+  if (!marking) return sure ? Verdict::good : Verdict::wrong;
+  const double height = l.moved_m(1) + e.move_m(1);
+  return sure && contrast_is_known && std::abs(height) < kLargestHeight_m &&
+                 std::sqrt(e.covariance(0, 0)) < kLargestSigma_m
+             ? Verdict::good
+             : Verdict::wrong;
+}
+
+}  // namespace
+
+void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, std::size_t i) {
+  ContourPoint& p = map_.points[i];
+  p.position += (l.directions * e.move_m).cast<float>();
+  p.sigma = static_cast<float>(std::sqrt(0.5 * e.covariance.trace() + kFloor_m * kFloor_m));
+  records_[i].was_told = true;
+}
+
+void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& segments,
+                        const FlightObservations& observed) {
+  const auto unknowns = landmarks(segments);
+  std::vector<bool> gone(map_.points.size(), false);
+  for (std::size_t i = 0; i < map_.points.size(); ++i) {
+    const std::uint32_t s = segments.of_point[i];
+    ContourPoint& p = map_.points[i];
+    Record& record = records_[i];
+    const bool marking = unknowns[s].plane >= 0;
+    if (marking) {
+      const auto plane = static_cast<std::size_t>(unknowns[s].plane);
+      p.position += static_cast<float>(result.planes_m[plane]) * map_.planes[plane].normal;
+    }
+    const LandmarkEstimate& e = result.landmarks[s];
+    const Verdict verdict = judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
+    if (verdict == Verdict::good) {
+      take(e, unknowns[s], i);
+      p.contrast = observed.map.points[i].contrast;
+    }
+    gone[i] = verdict == Verdict::wrong || (record.is_new && verdict == Verdict::untold);
+    if (gone[i] && !record.is_new) struck_m_ += static_cast<double>(p.length);
+  }
+  for (std::size_t p = 0; p < planes_moved_m_.size(); ++p) {
+    planes_moved_m_[p] += result.planes_m[p];
+    map_.planes[p].d -= result.planes_m[p];
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < map_.points.size(); ++i)
+    if (!gone[i]) map_.points[kept] = map_.points[i], records_[kept] = records_[i], ++kept;
+  map_.points.resize(kept);
+  records_.resize(kept);
+}
+
+LearntLengths LearningMap::lengths() const {
+  LearntLengths out;
+  out.struck_m = struck_m_;
+  for (std::size_t i = 0; i < map_.points.size(); ++i) {
+    const auto length = static_cast<double>(map_.points[i].length);
+    (records_[i].is_new ? out.new_m : records_[i].was_told ? out.moved_m : out.kept_m) += length;
+  }
+  return out;
+}
+
+}  // namespace evpose::map_learn

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "evpose/map/contour_map.h"
+#include "evpose/map/contour_segments.h"
+#include "evpose/map_learn/joint_adjustment.h"
+#include "evpose/map_learn/observe_flight.h"
+
+namespace evpose::map_learn {
+
+/// What became of the contours, m.
+struct LearntLengths {
+  double kept_m = 0;    ///< of the given map, not seen well enough to say anything
+  double moved_m = 0;   ///< of the given map, told anew by events
+  double struck_m = 0;  ///< of the given map, contradicted by events
+  double new_m = 0;     ///< markings that were learnt
+};
+
+/// A map whose contours move, go and come while flights are adjusted to it.
+class LearningMap {
+ public:
+  explicit LearningMap(const ContourMap& given);
+
+  /// As it is now.
+  const ContourMap& map() const { return map_; }
+  /// Markings whose place is as well known as the trajectory that they were seen from.
+  void add_markings(const std::vector<ContourPoint>& points);
+
+  /// The contrast segments of map() as unknowns, with what was known of each before this flight.
+  std::vector<Landmark> landmarks(const ContourSegments& segments) const;
+  /// All planes.
+  std::vector<PlaneError> planes() const;
+  /// Moves contours and planes; strikes those out that the events contradict, and markings that are not sure.
+  /// `observed`: of map() as it is now, in the order of the result's landmarks.
+  void apply(const AdjustmentResult& result, const ContourSegments& segments,
+             const FlightObservations& observed);
+
+  LearntLengths lengths() const;
+  std::int32_t next_contour() const;
+
+ private:
+  /// Beside a point of map_.
+  struct Record {
+    Eigen::Vector3f given = Eigen::Vector3f::Zero();  ///< where it was before this flight
+    float given_sigma = 0;
+    bool is_new = false;    ///< a marking of this flight
+    bool was_told = false;  ///< by events of this flight
+  };
+  void take(const LandmarkEstimate& estimate, const Landmark& landmark, std::size_t point);
+
+  ContourMap map_;
+  std::vector<Record> records_;
+  std::vector<double> planes_moved_m_;
+  double struck_m_ = 0;
+};
+
+}  // namespace evpose::map_learn

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_learn/learning_map.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace evpose::map_learn {
+namespace {
+
+/// Two rims of a floor, 10 cm long and a metre apart, each inside one cube of the segments.
+ContourMap two_rims() {
+  ContourMap map;
+  map.planes = {{Eigen::Vector3f::UnitZ(), 0, 1000, 0.01F}};
+  for (int contour = 0; contour < 2; ++contour)
+    for (int i = 0; i < 10; ++i) {
+      ContourPoint p;
+      p.position = {0.01F + 0.01F * static_cast<float>(i), static_cast<float>(contour) + 0.05F, 0.05F};
+      p.tangent = Eigen::Vector3f::UnitX();
+      p.normal = Eigen::Vector3f::UnitY();
+      p.length = 0.01F;
+      p.sigma = 3e-3F;
+      p.contour = contour;
+      p.plane_a = 0;
+      p.kind = ContourKind::boundary;
+      map.points.push_back(p);
+    }
+  return map;
+}
+
+std::vector<ContourPoint> marking(float y) {
+  std::vector<ContourPoint> out;
+  for (ContourPoint p : two_rims().points) {
+    if (p.contour != 0) continue;
+    p.contour = 7;
+    p.kind = ContourKind::marking;
+    p.position.y() = y;
+    out.push_back(p);
+  }
+  return out;
+}
+
+AdjustmentResult nothing_told(std::uint32_t segments) {
+  AdjustmentResult out;
+  out.planes_m = {0};
+  out.landmarks.resize(segments);
+  return out;
+}
+
+LandmarkEstimate good(double move_m) {
+  LandmarkEstimate e;
+  e.move_m = {move_m, 0};
+  e.covariance = 0.25e-6 * Eigen::Matrix2d::Identity();
+  e.chi2 = 1;
+  e.observations = 20;
+  return e;
+}
+
+/// `contrast`: of all points, as the events told.
+FlightObservations seen(const LearningMap& map, std::int8_t contrast) {
+  FlightObservations out;
+  out.map = map.map();
+  for (ContourPoint& p : out.map.points) p.contrast = contrast;
+  return out;
+}
+
+TEST(LearningMap, WhatEventsTellMovesAndTheRestStays) {
+  LearningMap map(two_rims());
+  const ContourSegments segments = cut_into_segments(map.map());
+  ASSERT_EQ(segments.count, 2u);
+  AdjustmentResult result = nothing_told(2);
+  result.landmarks[segments.of_point[0]] = good(4e-3);
+  map.apply(result, segments, seen(map, 1));
+  const ContourMap given = two_rims();
+  for (std::size_t i = 0; i < 20; ++i) {
+    const Eigen::Vector3f moved = map.map().points[i].position - given.points[i].position;
+    EXPECT_NEAR((moved - (i < 10 ? 4e-3F : 0.0F) * Eigen::Vector3f::UnitY()).norm(), 0, 1e-6);
+    EXPECT_EQ(map.map().points[i].contrast, i < 10 ? 1 : 0);
+    EXPECT_NEAR(map.map().points[i].sigma, i < 10 ? std::hypot(0.5e-3F, 0.3e-3F) : 3e-3F, 1e-6F);
+  }
+  EXPECT_NEAR(map.lengths().moved_m, 0.1, 1e-6);
+  EXPECT_NEAR(map.lengths().kept_m, 0.1, 1e-6);
+}
+
+TEST(LearningMap, AnAppliedMoveIsHeldAgainstWhereTheContourWasGiven) {
+  LearningMap map(two_rims());
+  const ContourSegments segments = cut_into_segments(map.map());
+  AdjustmentResult result = nothing_told(2);
+  result.landmarks[segments.of_point[0]] = good(4e-3);
+  map.apply(result, segments, seen(map, 1));
+  const auto landmarks = map.landmarks(segments);
+  EXPECT_NEAR(landmarks[segments.of_point[0]].moved_m(0), 4e-3, 1e-6);
+  EXPECT_NEAR(landmarks[segments.of_point[0]].sigma_m(0), std::hypot(3e-3, 2e-3), 1e-6);
+  EXPECT_NEAR(landmarks[segments.of_point[10]].moved_m.norm(), 0, 1e-6);
+}
+
+TEST(LearningMap, AContourThatItsEventsContradictIsStruckOut) {
+  LearningMap map(two_rims());
+  const ContourSegments segments = cut_into_segments(map.map());
+  AdjustmentResult result = nothing_told(2);
+  result.landmarks[segments.of_point[0]] = good(0);
+  result.landmarks[segments.of_point[0]].chi2 = 6;
+  map.apply(result, segments, seen(map, 1));
+  ASSERT_EQ(map.map().points.size(), 10u);
+  EXPECT_EQ(map.map().points[0].contour, 1);
+  EXPECT_NEAR(map.lengths().struck_m, 0.1, 1e-6);
+}
+
+TEST(LearningMap, AMarkingStaysIfEventsTellItsPlaceAndContrast) {
+  for (const std::int8_t contrast : {std::int8_t{0}, std::int8_t{1}}) {
+    LearningMap map(two_rims());
+    map.add_markings(marking(0.53F));
+    const ContourSegments segments = cut_into_segments(map.map());
+    AdjustmentResult result = nothing_told(segments.count);
+    result.landmarks[segments.of_point[25]] = good(1e-3);
+    map.apply(result, segments, seen(map, contrast));
+    EXPECT_EQ(map.map().points.size(), contrast != 0 ? 30u : 20u);
+    EXPECT_NEAR(map.lengths().new_m, contrast != 0 ? 0.1 : 0, 1e-6);
+  }
+}
+
+TEST(LearningMap, AMarkingMovesWithItsPlaneAndIsFreeAlongIt) {
+  LearningMap map(two_rims());
+  map.add_markings(marking(0.53F));
+  const ContourSegments segments = cut_into_segments(map.map());
+  AdjustmentResult result = nothing_told(segments.count);
+  result.landmarks[segments.of_point[25]] = good(0);
+  result.planes_m = {0.4e-3};
+  map.apply(result, segments, seen(map, 1));
+  EXPECT_NEAR(map.map().points[25].position.z(), 0.05F + 0.4e-3F, 1e-6F);
+  const Landmark l = map.landmarks(segments)[segments.of_point[25]];
+  EXPECT_NEAR(l.moved_m.norm(), 0, 1e-6);  // that was the plane's move
+  EXPECT_GT(l.sigma_m(0), 0.05);
+  EXPECT_NEAR(map.planes()[0].moved_m, 0.4e-3, 1e-9);
+}
+
+}  // namespace
+}  // namespace evpose::map_learn

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_learn/map_learner.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "evpose/batch/batch_estimator.h"
+#include "evpose/core/log.h"
+#include "evpose/map_learn/observe_flight.h"
+#include "evpose/map_learn/plane_events.h"
+
+namespace evpose::map_learn {
+namespace {
+
+constexpr int kSmoothings = 2;
+constexpr int kPasses = 3;            // of looking for markings and adjusting
+constexpr double kLeastTracked = 0.5;  // of a flight that is of this map
+constexpr double kDegree = 57.29577951;
+
+/// What is known of the first state beside the recording: little, so that the cloud alone gives the frame.
+Vector15d start_sigma() {
+  Vector15d sigma;
+  sigma << Eigen::Vector3d::Constant(0.03), Eigen::Vector3d::Constant(0.02), Eigen::Vector3d::Constant(0.5),
+      Eigen::Vector3d::Constant(0.02), Eigen::Vector3d::Constant(0.1);
+  return sigma;
+}
+
+/// One flight and a map on their way to each other.
+class FlightLearner {
+ public:
+  FlightLearner(const TrackRequest& request, const ContourMap& map, const LearnProgress& progress)
+      : request_(request), learning_(map), progress_(progress) {}
+
+  Expected<LearntMap> learn();
+
+ private:
+  Status prepare_flight(const ContourMap& map);
+  Status smooth();
+  Status find_markings_of_flight();
+  Status adjust_once();
+  void use(const ContourMap& map);
+  void report(const AdjustmentResult& result, const FlightObservations& seen,
+              const std::vector<Landmark>& landmarks);
+  /// Of the steps of the work: the share of the present one, 0..1.
+  bool go_on(double share) {
+    constexpr double kSteps = 1 + kSmoothings + 2 * kPasses;
+    return !(interrupted_ = interrupted_ || !progress_(std::min(1.0, (steps_done_ + share) / kSteps)));
+  }
+
+  const TrackRequest& request_;
+  LearningMap learning_;
+  const LearnProgress& progress_;
+  std::optional<TrackJob> job_;
+  Trajectory trajectory_;
+  FlightReport report_;
+  int steps_done_ = 0;
+  bool interrupted_ = false;
+};
+
+void FlightLearner::use(const ContourMap& map) {
+  auto shared = std::make_shared<const ContourMap>(map);
+  job_->map = shared;
+  job_->setup.map = shared;
+}
+
+Status FlightLearner::prepare_flight(const ContourMap& map) {
+  const auto asked = load_config(request_);
+  if (!asked) return asked.error();
+  auto job = prepare(request_, *asked);
+  if (!job) return job.error();
+  if (!job->recording.has_imu)
+    return Error{request_.recording, "has no IMU", "learn from recordings with an IMU"};
+  job_.emplace(std::move(*job));
+  use(map);
+  return {};
+}
+
+Status FlightLearner::smooth() {
+  BatchEstimator estimator(*job_);
+  const auto progress = [&](double share) { return go_on(share); };
+  if (auto ok = estimator.filter(request_, progress); !ok) return ok;
+  if (interrupted_) return {};
+  const auto& updates = estimator.updates();
+  const auto tracked = std::count_if(updates.begin(), updates.end(),
+                                     [](const Update& u) { return u.health == Health::tracking; });
+  report_.tracked = static_cast<double>(tracked) / static_cast<double>(updates.size());
+  report_.seconds = to_seconds(updates.back().t - updates.front().t);
+  if (report_.tracked < kLeastTracked)
+    return Error{request_.recording,
+                 text("was tracked in ", std::lround(100 * report_.tracked),
+                      " % of its time with this map; nothing can be learnt from it"),
+                 "check that it was flown in the place of the map; evpose check says more"};
+  for (int pass = 0; pass < kSmoothings; ++pass) {
+    ++steps_done_;
+    const auto changed = estimator.iterate(request_, progress);
+    if (!changed) return changed.error();
+    if (interrupted_) return {};
+  }
+  ++steps_done_;
+  trajectory_ = estimator.trajectory();
+  const auto map = job_->map;
+  job_ = estimator.at_present_values();
+  return {};
+}
+
+Status FlightLearner::find_markings_of_flight() {
+  const auto planes = events_on_planes(*job_, trajectory_, [&](double share) { return go_on(share); });
+  ++steps_done_;
+  if (!planes) return planes.error();
+  if (!interrupted_)
+    learning_.add_markings(find_markings(*planes, learning_.map(), learning_.next_contour()));
+  return {};
+}
+
+Status FlightLearner::adjust_once() {
+  use(learning_.map());
+  const auto seen = observe_flight(*job_, trajectory_, [&](double share) { return go_on(share); });
+  ++steps_done_;
+  if (!seen) return seen.error();
+  if (interrupted_) return {};
+  const ContourSegments segments = cut_into_segments(learning_.map());
+  AdjustmentProblem problem;
+  problem.steps = seen->steps;
+  problem.start_sigma = start_sigma();
+  problem.landmarks = learning_.landmarks(segments);
+  problem.planes = learning_.planes();
+  problem.observations = seen->observations;
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const std::size_t k : seen->knots) rotations.push_back(trajectory_[k].nav.T_map_body.rotation());
+  const AdjustmentResult result = adjust(problem, rotations);
+  add_at_knots(seen->knots, result.states, trajectory_);
+  std::size_t knot = 0;
+  for (std::size_t i = 0; i < trajectory_.size(); ++i) {
+    while (knot + 1 < seen->knots.size() && seen->knots[knot + 1] <= i) ++knot;
+    trajectory_[i].covariance.topLeftCorner<6, 6>() = result.pose_covariances[knot];
+  }
+  learning_.apply(result, segments, *seen);
+  report(result, *seen, problem.landmarks);
+  return {};
+}
+
+/// Root mean square angle of directions about their mean, per landmark; its median over the landmarks.
+double median_spread_rad(const FlightObservations& seen) {
+  std::vector<double> spreads;
+  for (std::size_t i = 0, end = 0; i < seen.observations.size(); i = end) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (end = i; end < seen.observations.size() &&
+                  seen.observations[end].landmark == seen.observations[i].landmark;
+         ++end)
+      sum += seen.views[end];
+    const auto count = static_cast<double>(end - i);
+    if (count >= 4) spreads.push_back(std::sqrt(std::max(0.0, 2 * (1 - sum.norm() / count))));
+  }
+  if (spreads.empty()) return 0;
+  const auto middle = spreads.begin() + static_cast<std::ptrdiff_t>(spreads.size() / 2);
+  std::nth_element(spreads.begin(), middle, spreads.end());
+  return *middle;
+}
+
+/// Directions of planes, more than 30 degrees apart, on which markings were told.
+int count_plane_directions(const LearningMap& map) {
+  constexpr double kApart = 0.87;
+  std::vector<Eigen::Vector3f> directions;
+  for (const ContourPoint& p : map.map().points) {
+    if (p.kind != ContourKind::marking || p.plane_a < 0) continue;
+    const Eigen::Vector3f& n = map.map().planes[static_cast<std::size_t>(p.plane_a)].normal;
+    if (std::none_of(directions.begin(), directions.end(),
+                     [&](const Eigen::Vector3f& d) { return std::abs(d.dot(n)) > kApart; }))
+      directions.push_back(n);
+  }
+  return static_cast<int>(directions.size());
+}
+
+void FlightLearner::report(const AdjustmentResult& result, const FlightObservations& seen,
+                           const std::vector<Landmark>&) {
+  if (report_.explained_before == 0) report_.explained_before = seen.explained;
+  report_.explained_after = seen.explained;
+  report_.view_spread_deg = kDegree * median_spread_rad(seen);
+  report_.delay_px += result.delay_px;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(result.common_covariance.topLeftCorner<3, 3>());
+  report_.common_sigma_m = eigen.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
+  report_.common_axes = eigen.eigenvectors().rowwise().reverse();
+  report_.common_rotation_sigma_rad = std::sqrt(result.common_covariance.bottomRightCorner<3, 3>().trace() / 3);
+  report_.plane_directions = count_plane_directions(learning_);
+  report_.lengths = learning_.lengths();
+  log_detail(text("pass: ", seen.observations.size(), " observations, common sigma ",
+                  1e3 * report_.common_sigma_m.x(), " mm, delay ", result.delay_px, " px, explained ",
+                  seen.explained, ", moved ", report_.lengths.moved_m, " m, struck ", report_.lengths.struck_m,
+                  " m, new ", report_.lengths.new_m, " m"));
+}
+
+Expected<LearntMap> FlightLearner::learn() {
+  report_.recording = request_.recording;
+  if (auto ok = prepare_flight(learning_.map()); !ok) return ok.error();
+  if (auto ok = smooth(); !ok) return ok.error();
+  for (int pass = 0; pass < kPasses && !interrupted_; ++pass) {
+    if (pass + 1 < kPasses)
+      if (auto ok = find_markings_of_flight(); !ok) return ok.error();
+    if (interrupted_) break;
+    if (auto ok = adjust_once(); !ok) return ok.error();
+  }
+  if (interrupted_) return LearntMap{};
+  return LearntMap{learning_.map(), report_, trajectory_};
+}
+
+}  // namespace
+
+Expected<LearntMap> learn_from_flight(const TrackRequest& request, const ContourMap& map,
+                                      const LearnProgress& progress) {
+  return FlightLearner(request, map, progress).learn();
+}
+
+}  // namespace evpose::map_learn

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "evpose/core/error.h"
+#include "evpose/map_learn/learning_map.h"
+#include "evpose/map_learn/trajectory.h"
+#include "evpose/run/track_recording.h"
+
+namespace evpose::map_learn {
+
+/// What one flight has told.
+struct FlightReport {
+  std::string recording;
+  double seconds = 0;
+  double tracked = 0;  ///< share of the updates, by the filter, with the map before
+  double explained_before = 0, explained_after = 0;  ///< share of the events that lie on contours
+  LearntLengths lengths;
+  double view_spread_deg = 0;  ///< typical angle between the directions from which a contour was seen
+  double delay_px = 0;         ///< of all events, beside the edge delay
+  /// What ties the result to the cloud's frame: of all that was learnt together, position (map frame).
+  Eigen::Vector3d common_sigma_m = Eigen::Vector3d::Zero();  ///< weakest first
+  Eigen::Matrix3d common_axes = Eigen::Matrix3d::Identity();  ///< columns, of these
+  double common_rotation_sigma_rad = 0;
+  int plane_directions = 0;  ///< seen: 3 tie the frame without trusting a contour
+};
+
+/// What a pass over a flight is told, 0..1; false ends it.
+using LearnProgress = std::function<bool(double)>;
+
+/// A map made better by one flight.
+struct LearntMap {
+  ContourMap map;
+  FlightReport report;
+  Trajectory trajectory;  ///< of the flight, as adjusted
+};
+
+/// Smooths the recording of `request` with `map` in place of the request's, finds markings on its planes, and
+/// adjusts trajectory, contours, markings and planes together. Interrupted: an empty map. Errors: of the
+/// recording; no IMU; a flight that was lost, or that tells nothing.
+Expected<LearntMap> learn_from_flight(const TrackRequest& request, const ContourMap& map,
+                                      const LearnProgress& progress);
+
+}  // namespace evpose::map_learn

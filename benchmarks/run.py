@@ -33,6 +33,7 @@ BENCHMARKS = {
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
     "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "15 min"),
     "map": ("maps", "make", "maps built from clouds, and tracking with them", "15 min"),
+    "learn": ("learn", "make", "maps made better by flights, and tracking with them", "10 min"),
     "map-scale": ("map_scale", "make", "time and memory of map building", "10 min"),
     "latency": ("latency", "make", "stages of an update on whole recordings, and at high rates", "3 min"),
     "performance": ("performance", "make", "kernels and decoders by themselves (evpose_microbench)", "10 min"),

@@ -13,7 +13,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]evpose/([a-z_]+)/(?:([a-z0-9_]+)/)?', re.MULTILINE)
-WIDTH, HEIGHT, ROW, TOP = 1200, 746, 80, 24
+WIDTH, HEIGHT, ROW, TOP = 1200, 826, 80, 24
 
 # Module: row (0 is the lowest), left, width, what it does. Blue boxes are the embeddable part, yellow ones the roof.
 PLACES = {
@@ -35,22 +35,23 @@ PLACES = {
     "run": (6, 290, 310, "a recording through the tracker"),
     "view": (6, 640, 265, "browser: server and pages"),
     "batch": (7, 290, 310, "all data at once: smoother"),
+    "map_learn": (8, 290, 310, "maps made better by flights"),
     "bench": (7, 20, 240, "what the figures are made with"),
-    "apps": (8, 290, 490, "the program: one file per command"),
-    "ros": (8, 800, 180, "ROS 1 node"),
-    "python": (8, 1000, 180, "Python module"),
+    "apps": (9, 290, 490, "the program: one file per command"),
+    "ros": (9, 800, 180, "ROS 1 node"),
+    "python": (9, 1000, 180, "Python module"),
 }
 EMBEDDABLE = {"core", "event", "camera", "imu", "map", "registration", "fusion", "tracker"}
 ROOF = {"apps", "ros", "python", "bench"}
 
 # The flow of the data: corners as (module, x share, side) or plain points, and a label with its place.
 FLOW = [
-    ([(300, 524), ("io", 0.483, "bottom")], "recordings, clouds, maps", (312, 518)),
-    ([("io", 1.0, "right"), (622, 453), (622, 373), ("tracker", 0.0, "left")], "", None),
-    ([("serve", 0.15, "bottom"), ("tracker", 0.0736, "top")], "packets", (687, 338)),
-    ([("tracker", 0.206, "top"), ("serve", 0.42, "bottom")], "poses", (758, 338)),
-    ([("tracker", 0.77, "top"), ("mavlink", 0.531, "bottom")], "poses", (1063, 338)),
-    ([("tracker", 0.03, "top"), (656, 333), (612, 333), (612, 213), ("run", 1.0, "right")], "", None),
+    ([(300, 604), ("io", 0.483, "bottom")], "recordings, clouds, maps", (312, 598)),
+    ([("io", 1.0, "right"), (622, 533), (622, 453), ("tracker", 0.0, "left")], "", None),
+    ([("serve", 0.15, "bottom"), ("tracker", 0.0736, "top")], "packets", (687, 418)),
+    ([("tracker", 0.206, "top"), ("serve", 0.42, "bottom")], "poses", (758, 418)),
+    ([("tracker", 0.77, "top"), ("mavlink", 0.531, "bottom")], "poses", (1063, 418)),
+    ([("tracker", 0.03, "top"), (656, 413), (612, 413), (612, 293), ("run", 1.0, "right")], "", None),
 ]
 
 
@@ -123,7 +124,7 @@ def faults(imports):
 
 def box_of(module):
     row, x, width, _ = PLACES[module]
-    return x, TOP + (8 - row) * ROW, width, 58
+    return x, TOP + (9 - row) * ROW, width, 58
 
 
 def corner(point):
@@ -171,7 +172,7 @@ def draw(imports, rooms):
             f"{'M' if k == 0 else 'L'}{x:.0f} {y:.0f}" for k, (x, y) in enumerate(map(corner, points))) + '"/>')
         if label:
             out.append(f'<text class="data" x="{place[0]}" y="{place[1]}">{label}</text>')
-    y = 572
+    y = 652
     out += [f'<rect class="core" x="20" y="{y}" width="26" height="16" rx="3"/>',
             f'<text class="key" x="56" y="{y + 13}">embeddable: Eigen alone; no files, sockets or wall clock</text>',
             f'<path class="import" d="M20 {y + 33} L46 {y + 33}"/>',

@@ -47,7 +47,6 @@ nlohmann::ordered_json as_json(const FlightReport& r) {
           {"new_m", r.lengths.new_m},
           {"view_spread_deg", r.view_spread_deg},
           {"delay_px", r.delay_px},
-          {"plane_directions", r.plane_directions},
           {"common_sigma_mm", {1e3 * r.common_sigma_m(0), 1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2)}},
           {"weakest_direction", {axis.x(), axis.y(), axis.z()}},
           {"common_rotation_sigma_deg", r.common_rotation_sigma_rad * 57.29577951}};
@@ -58,11 +57,10 @@ void print_flight(const FlightReport& r) {
       "flight     %s: %.1f s, tracked %.0f %%, contours seen from %.1f deg apart\n"
       "contours   %.1f m moved, %.1f m struck out, %.1f m new on planes, %.1f m of the map not seen\n"
       "events     %.0f %% lie on contours, %.0f %% before\n"
-      "frame      %d directions of planes; all together stand within %.1f mm (1 sigma) along %s, %.1f and "
-      "%.1f mm across, %.3f deg\n",
+      "frame      all together stand within %.1f mm (1 sigma) along %s, %.1f and %.1f mm across, %.3f deg\n",
       r.recording.c_str(), r.seconds, 100 * r.tracked, r.view_spread_deg, r.lengths.moved_m,
       r.lengths.struck_m, r.lengths.new_m, r.lengths.kept_m, 100 * r.explained_after,
-      100 * r.explained_before, r.plane_directions, 1e3 * r.common_sigma_m(0),
+      100 * r.explained_before, 1e3 * r.common_sigma_m(0),
       axis_words(r.common_axes.col(0)).c_str(), 1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2),
       r.common_rotation_sigma_rad * 57.29577951);
   std::fflush(stdout);

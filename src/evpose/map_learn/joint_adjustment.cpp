@@ -24,10 +24,8 @@ using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 /// Where each unknown stands.
 struct Layout {
   explicit Layout(const AdjustmentProblem& p)
-      : planes(15 * static_cast<Index>(p.knots())),
-        delay(planes + static_cast<Index>(p.planes.size())),
-        size(delay + 1) {}
-  Index planes, delay, size;
+      : delay(15 * static_cast<Index>(p.knots())), size(delay + 1) {}
+  Index delay, size;
 };
 
 /// Derivative of one observation by its unknowns.
@@ -44,9 +42,6 @@ Row row_of(const AdjustmentProblem& p, const Layout& at, const Observation& o) {
     row.kept.emplace_back(first, (1 - o.share) * o.by_pose(i));
     if (o.share > 0) row.kept.emplace_back(first + 15, o.share * o.by_pose(i));
   }
-  if (landmark.plane >= 0)
-    row.kept.emplace_back(at.planes + landmark.plane,
-                          o.by_point.dot(p.planes[static_cast<std::size_t>(landmark.plane)].normal));
   row.kept.emplace_back(at.delay, o.forward);
   row.own << landmark.directions.transpose() * o.by_point, o.forward;
   return row;
@@ -140,12 +135,6 @@ void Adjuster::add_priors(Eigen::MatrixXd& H, Eigen::VectorXd& b) const {
     H.block<30, 30>(at, at) += JW * J;
     b.segment<30>(at) -= JW * step.offset;
   }
-  for (std::size_t i = 0; i < p_.planes.size(); ++i) {
-    const Index at = at_.planes + static_cast<Index>(i);
-    const double w = 1 / (p_.planes[i].sigma_m * p_.planes[i].sigma_m);
-    H(at, at) += w;
-    b(at) -= w * p_.planes[i].moved_m;
-  }
   H(at_.delay, at_.delay) += 1 / (p_.delay_sigma_px * p_.delay_sigma_px);
 }
 
@@ -214,6 +203,11 @@ LandmarkEstimate Adjuster::estimate(std::size_t j, const Eigen::MatrixXd& covari
       kept(a, c) = covariance(s.columns[static_cast<std::size_t>(a)], s.columns[static_cast<std::size_t>(c)]);
   const Rows3 gain = s.mixed * inverse;
   out.covariance = (inverse + gain.transpose() * kept * gain).topLeftCorner<2, 2>();
+  for (std::size_t i = first_[j]; i < first_[j + 1]; ++i) {
+    const Eigen::Vector2d across =
+        p_.landmarks[j].directions.transpose() * p_.observations[i].by_point.normalized();
+    out.seen_variance_m2 += across.dot(out.covariance * across) / out.observations;
+  }
   return out;
 }
 
@@ -229,8 +223,6 @@ AdjustmentResult Adjuster::result(const std::vector<Eigen::Matrix3d>& R_map_body
     mean.block<3, 3>(3, 15 * k + 3) = R_map_body[static_cast<std::size_t>(k)] / static_cast<double>(knots);
   }
   out.common_covariance = mean * covariance * mean.transpose();
-  for (std::size_t i = 0; i < p_.planes.size(); ++i)
-    out.planes_m.push_back(x_(at_.planes + static_cast<Index>(i)));
   out.delay_px = x_(at_.delay);
   out.landmarks.resize(p_.landmarks.size());
   for (std::size_t j = 0; j < p_.landmarks.size(); ++j)

@@ -16,7 +16,6 @@ struct Landmark {
   Eigen::Vector2d moved_m = Eigen::Vector2d::Zero();  ///< from where it was given to where it was seen
   Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();  ///< of where it was given
   bool doubtful = true;  ///< it may stand on another edge altogether: the first sigma is that of the many
-  int plane = -1;        ///< number of the plane whose error moves it, -1: none
 };
 
 /// What the events of one landmark said over a short time, at the present trajectory and place of it:
@@ -38,20 +37,13 @@ struct KnotStep {
   Vector15d offset = Vector15d::Zero();
 };
 
-/// A plane whose landmarks share its error along its normal.
-struct PlaneError {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, map frame
-  double moved_m = 0, sigma_m = 1;
-};
-
-/// Trajectory and landmarks of one flight. The unknowns are errors of the states at the knots (15 each), of
-/// the planes, one delay of all events, and three of each landmark, which are eliminated: what is left is the
-/// size of the knots.
+/// Trajectory and landmarks of one flight. The unknowns are errors of the states at the knots (15 each),
+/// one delay of all events, and three of each landmark, which are eliminated: what is left is the size of the
+/// knots.
 struct AdjustmentProblem {
   std::vector<KnotStep> steps;  ///< one less than there are knots
   Vector15d start_sigma = Vector15d::Ones();
   std::vector<Landmark> landmarks;
-  std::vector<PlaneError> planes;
   std::vector<Observation> observations;  ///< those of a landmark together, in the order of their landmarks
   double delay_sigma_px = 0.05, own_delay_sigma_px = 0.08;
 
@@ -59,8 +51,9 @@ struct AdjustmentProblem {
 };
 
 struct LandmarkEstimate {
-  Eigen::Vector2d move_m = Eigen::Vector2d::Zero();  ///< along its directions, without that of its plane
+  Eigen::Vector2d move_m = Eigen::Vector2d::Zero();      ///< along its directions
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of its place, the trajectory's share included
+  double seen_variance_m2 = 0;  ///< of it across the contour in the image, from where it was seen
   double chi2 = 0;      ///< mean of (residual / sigma)^2 of its observations, cut off at 9
   int observations = 0;
   double delay_px = 0;  ///< of its events, beside that of all
@@ -68,7 +61,6 @@ struct LandmarkEstimate {
 
 struct AdjustmentResult {
   std::vector<Vector15d> states;  ///< errors at the knots
-  std::vector<double> planes_m;   ///< moves of the planes along their normals
   double delay_px = 0;
   std::vector<LandmarkEstimate> landmarks;
   /// Of the mean position and mean attitude error (map frame, m and rad) of the knots: what all that was

@@ -9,7 +9,7 @@
 namespace evpose::map_learn {
 namespace {
 
-/// A flight of a few knots that sees landmarks of two planes and free ones; everything drawn.
+/// A flight of a few knots that sees landmarks; everything drawn.
 AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t landmarks) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -25,7 +25,6 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
     p.steps.push_back(step);
   }
   p.start_sigma.setConstant(0.1);
-  p.planes = {{Eigen::Vector3d::UnitZ(), 1e-4, 5e-4}, {Eigen::Vector3d::UnitX(), -2e-4, 5e-4}};
   for (std::size_t j = 0; j < landmarks; ++j) {
     Landmark l;
     const Eigen::Vector3d tangent = vector(1).normalized();
@@ -33,7 +32,6 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
     l.directions.col(1) = tangent.cross(l.directions.col(0));
     l.moved_m = {1e-3 * normal(random), 1e-3 * normal(random)};
     l.sigma_m = {4e-3, 1e-3};
-    l.plane = static_cast<int>(j % 3) - 1;
     p.landmarks.push_back(l);
     for (std::size_t i = 0; i < 8; ++i) {
       Observation o;
@@ -51,11 +49,10 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
   return p;
 }
 
-/// Normal equations of all unknowns: knots, planes, delay, landmarks (two across, delay).
+/// Normal equations of all unknowns: knots, delay, landmarks (two across, delay).
 struct Dense {
   explicit Dense(const AdjustmentProblem& p)
-      : planes(15 * static_cast<int>(p.knots())),
-        delay(planes + static_cast<int>(p.planes.size())),
+      : delay(15 * static_cast<int>(p.knots())),
         landmarks(delay + 1),
         H(Eigen::MatrixXd::Zero(landmarks + 3 * static_cast<int>(p.landmarks.size()),
                                 landmarks + 3 * static_cast<int>(p.landmarks.size()))),
@@ -76,8 +73,6 @@ struct Dense {
       J.block<15, 15>(0, 15 * k + 15).setIdentity();
       add(J, -p.steps[static_cast<std::size_t>(k)].offset, p.steps[static_cast<std::size_t>(k)].noise.inverse());
     }
-    for (int i = 0; i < static_cast<int>(p.planes.size()); ++i)
-      prior(planes + i, -p.planes[static_cast<std::size_t>(i)].moved_m, p.planes[static_cast<std::size_t>(i)].sigma_m);
     prior(delay, 0, p.delay_sigma_px);
     for (int j = 0; j < static_cast<int>(p.landmarks.size()); ++j) {
       const Landmark& l = p.landmarks[static_cast<std::size_t>(j)];
@@ -90,13 +85,12 @@ struct Dense {
       const int knot = 15 * static_cast<int>(o.knot), own = landmarks + 3 * static_cast<int>(o.landmark);
       J.block<1, 6>(0, knot) = (1 - o.share) * o.by_pose.transpose();
       J.block<1, 6>(0, knot + 15) = o.share * o.by_pose.transpose();
-      if (l.plane >= 0) J(0, planes + l.plane) = o.by_point.dot(p.planes[static_cast<std::size_t>(l.plane)].normal);
       J(0, delay) = J(0, own + 2) = o.forward;
       J.block<1, 2>(0, own) = o.by_point.transpose() * l.directions;
       add(J, Eigen::VectorXd::Constant(1, o.offset_px), Eigen::MatrixXd::Constant(1, 1, 1 / o.variance_px));
     }
   }
-  int planes, delay, landmarks;
+  int delay, landmarks;
   Eigen::MatrixXd H;
   Eigen::VectorXd b;
 };
@@ -112,8 +106,6 @@ TEST(JointAdjustment, EliminationSolvesTheFullNormalEquations) {
     EXPECT_LT((result.pose_covariances[static_cast<std::size_t>(k)] - covariance.block<6, 6>(15 * k, 15 * k)).norm(),
               1e-12);
   }
-  for (int i = 0; i < 2; ++i)
-    EXPECT_NEAR(result.planes_m[static_cast<std::size_t>(i)], x(dense.planes + i), 1e-10);
   EXPECT_NEAR(result.delay_px, x(dense.delay), 1e-9);
   for (int j = 0; j < 30; ++j) {
     const LandmarkEstimate& e = result.landmarks[static_cast<std::size_t>(j)];
@@ -135,7 +127,7 @@ TEST(JointAdjustment, CommonCovarianceIsThatOfTheMeanPose) {
   EXPECT_LT((result.common_covariance - mean * covariance * mean.transpose()).norm(), 1e-12);
 }
 
-/// Observations that a known trajectory error, plane error and known places of the landmarks would make.
+/// Observations that a known trajectory error and known places of the landmarks would make.
 struct Known {
   std::vector<Vector15d> states;
   std::vector<Eigen::Vector2d> landmarks;
@@ -153,7 +145,6 @@ Known make_consistent(AdjustmentProblem& p, unsigned seed, double noise_px) {
   for (std::size_t k = 0; k + 1 < p.knots(); ++k)
     p.steps[k].offset = p.steps[k].transition * known.states[k] - known.states[k + 1];
   p.start_sigma.setConstant(1);
-  for (PlaneError& plane : p.planes) plane.moved_m = 0;
   for (Landmark& l : p.landmarks) {
     known.landmarks.emplace_back(2e-3 * normal(random), 0.5e-3 * normal(random));
     l.moved_m.setZero();
@@ -189,7 +180,8 @@ TEST(JointAdjustment, ShiftedContoursAndTrajectoryComeBackWithinTheirSigma) {
 TEST(JointAdjustment, ContoursOnAnotherEdgeDoNotPullTheTrajectory) {
   AdjustmentProblem p = drawn_problem(3, 6, 60);
   const Known known = make_consistent(p, 7, 0.1);
-  for (Observation& o : p.observations)  // every sixth stands 30 mm off
+  for (KnotStep& step : p.steps) step.noise = Matrix15d::Identity();  // contours alone hold the poses
+  for (Observation& o : p.observations)                               // every sixth stands 30 mm off
     if (o.landmark % 6 == 0) o.offset_px += o.by_point.dot(0.03 * p.landmarks[o.landmark].directions.col(0));
   const std::vector<Eigen::Matrix3d> R(6, Eigen::Matrix3d::Identity());
   const AdjustmentResult plain = adjust(p, R, 0), robust = adjust(p, R);
@@ -199,7 +191,7 @@ TEST(JointAdjustment, ContoursOnAnotherEdgeDoNotPullTheTrajectory) {
     of_robust += (robust.states[k] - known.states[k]).head<3>().norm() / 6;
   }
   EXPECT_LT(of_robust, 0.5 * of_plain);
-  EXPECT_LT(of_robust, 1e-3);
+  EXPECT_LT(of_robust, 2e-3);
   // They are found where they are.
   for (std::size_t j = 0; j < 60; j += 6)
     EXPECT_NEAR(robust.landmarks[j].move_m(0) - known.landmarks[j](0), 0.03, 5e-3);

@@ -11,22 +11,24 @@ namespace {
 // Of what a cloud's map says of a contour, beside the sigma that it states.
 constexpr double kContour_m = 2e-3;   // across it: some stand on another edge, and count less then
 constexpr double kSurface_m = 1e-3;   // of a rim along the normal of its face
-constexpr double kOffPlane_m = 0.5e-3;  // of a marking from its plane's mean: prints, bent faces
-constexpr double kPlane_m = 0.5e-3;     // of a plane's offset
-constexpr double kFree_m = 0.1;         // of a marking along its plane: nothing is known
+// Of a marking: nothing is known along its plane. Across it the parallax tells more than a built plane, whose
+// faces stand some millimetres off here and there and would bend the trajectory.
+constexpr double kAlongPlane_m = 0.1, kOffPlane_m = 0.03;
 // What is not in the adjustment's covariance: light and shade beside an edge, a tangent that leans.
 constexpr double kFloor_m = 0.3e-3;
+
+constexpr double kViewChange = 0.25;  // rad by which views differ from those that told a contour's place
 
 // What a landmark has to show.
 constexpr int kLeastObservations = 5;  // a quarter of a second
 constexpr double kWorstChi2 = 3;
 constexpr double kLargestDelay_px = 0.25;
 constexpr double kLargestSigma_m = 3e-3;
-constexpr double kLargestHeight_m = 2e-3;  // of a marking over its plane
+constexpr double kLargestHeight_m = 3e-3;  // of a marking over its plane, beside three sigmas
 
 }  // namespace
 
-LearningMap::LearningMap(const ContourMap& given) : map_(given), planes_moved_m_(given.planes.size(), 0) {
+LearningMap::LearningMap(const ContourMap& given) : map_(given) {
   std::int32_t next = next_contour();
   for (ContourPoint& p : map_.points) {
     if (p.contour < 0 && p.kind == ContourKind::marking) p.contour = next++;
@@ -70,28 +72,17 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
     Eigen::Vector3d n = normal[s] - normal[s].dot(t) * t;
     n = n.norm() > 0.1 * points[s] ? n.normalized() : t.unitOrthogonal();
     l.directions << n, t.cross(n);
-    Eigen::Vector3d by_own = moved[s] / points[s];
     const double stated = sigma[s] / points[s];
-    const bool marking = example[s]->kind == ContourKind::marking && example[s]->plane_a >= 0;
-    if (marking) {
-      l.plane = example[s]->plane_a;
-      const auto plane = static_cast<std::size_t>(l.plane);
-      by_own -= planes_moved_m_[plane] * map_.planes[plane].normal.cast<double>();
-      l.sigma_m = {record[s]->is_new ? kFree_m : stated, kOffPlane_m};
+    if (example[s]->kind == ContourKind::marking) {
+      l.sigma_m = record[s]->is_new ? Eigen::Vector2d(kAlongPlane_m, kOffPlane_m)
+                                    : Eigen::Vector2d(stated, stated / kViewChange);
       l.doubtful = !record[s]->is_new;
     } else {
       const double across = std::hypot(stated, kContour_m);
       l.sigma_m = {across, example[s]->kind == ContourKind::boundary ? std::hypot(stated, kSurface_m) : across};
     }
-    l.moved_m = l.directions.transpose() * by_own;
+    l.moved_m = l.directions.transpose() * (moved[s] / points[s]);
   }
-  return out;
-}
-
-std::vector<PlaneError> LearningMap::planes() const {
-  std::vector<PlaneError> out;
-  for (std::size_t i = 0; i < map_.planes.size(); ++i)
-    out.push_back({map_.planes[i].normal.cast<double>(), planes_moved_m_[i], kPlane_m});
   return out;
 }
 
@@ -105,8 +96,8 @@ Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool c
   const bool sure = e.chi2 < kWorstChi2 && std::abs(e.delay_px) < kLargestDelay_px;
   if (!marking) return sure ? Verdict::good : Verdict::wrong;
   const double height = l.moved_m(1) + e.move_m(1);
-  return sure && contrast_is_known && std::abs(height) < kLargestHeight_m &&
-                 std::sqrt(e.covariance(0, 0)) < kLargestSigma_m
+  return sure && contrast_is_known && std::abs(height) < kLargestHeight_m + 3 * std::sqrt(e.covariance(1, 1)) &&
+                 std::sqrt(e.seen_variance_m2) < kLargestSigma_m
              ? Verdict::good
              : Verdict::wrong;
 }
@@ -116,7 +107,8 @@ Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool c
 void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, std::size_t i) {
   ContourPoint& p = map_.points[i];
   p.position += (l.directions * e.move_m).cast<float>();
-  p.sigma = static_cast<float>(std::sqrt(0.5 * e.covariance.trace() + kFloor_m * kFloor_m));
+  const double elsewhere = kViewChange * kViewChange * e.covariance.trace();
+  p.sigma = static_cast<float>(std::sqrt(e.seen_variance_m2 + elsewhere + kFloor_m * kFloor_m));
   records_[i].was_told = true;
 }
 
@@ -128,23 +120,16 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     const std::uint32_t s = segments.of_point[i];
     ContourPoint& p = map_.points[i];
     Record& record = records_[i];
-    const bool marking = unknowns[s].plane >= 0;
-    if (marking) {
-      const auto plane = static_cast<std::size_t>(unknowns[s].plane);
-      p.position += static_cast<float>(result.planes_m[plane]) * map_.planes[plane].normal;
-    }
+    const bool marking = p.kind == ContourKind::marking;
     const LandmarkEstimate& e = result.landmarks[s];
-    const Verdict verdict = judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
+    const Verdict verdict =
+        judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
     if (verdict == Verdict::good) {
       take(e, unknowns[s], i);
       p.contrast = observed.map.points[i].contrast;
     }
     gone[i] = verdict == Verdict::wrong || (record.is_new && verdict == Verdict::untold);
     if (gone[i] && !record.is_new) struck_m_ += static_cast<double>(p.length);
-  }
-  for (std::size_t p = 0; p < planes_moved_m_.size(); ++p) {
-    planes_moved_m_[p] += result.planes_m[p];
-    map_.planes[p].d -= result.planes_m[p];
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < map_.points.size(); ++i)

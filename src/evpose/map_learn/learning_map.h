@@ -31,9 +31,7 @@ class LearningMap {
 
   /// The contrast segments of map() as unknowns, with what was known of each before this flight.
   std::vector<Landmark> landmarks(const ContourSegments& segments) const;
-  /// All planes.
-  std::vector<PlaneError> planes() const;
-  /// Moves contours and planes; strikes those out that the events contradict, and markings that are not sure.
+  /// Moves contours; strikes those out that the events contradict, and markings that are not sure.
   /// `observed`: of map() as it is now, in the order of the result's landmarks.
   void apply(const AdjustmentResult& result, const ContourSegments& segments,
              const FlightObservations& observed);
@@ -53,7 +51,6 @@ class LearningMap {
 
   ContourMap map_;
   std::vector<Record> records_;
-  std::vector<double> planes_moved_m_;
   double struck_m_ = 0;
 };
 

@@ -42,7 +42,6 @@ std::vector<ContourPoint> marking(float y) {
 
 AdjustmentResult nothing_told(std::uint32_t segments) {
   AdjustmentResult out;
-  out.planes_m = {0};
   out.landmarks.resize(segments);
   return out;
 }
@@ -76,7 +75,7 @@ TEST(LearningMap, WhatEventsTellMovesAndTheRestStays) {
     const Eigen::Vector3f moved = map.map().points[i].position - given.points[i].position;
     EXPECT_NEAR((moved - (i < 10 ? 4e-3F : 0.0F) * Eigen::Vector3f::UnitY()).norm(), 0, 1e-6);
     EXPECT_EQ(map.map().points[i].contrast, i < 10 ? 1 : 0);
-    EXPECT_NEAR(map.map().points[i].sigma, i < 10 ? std::hypot(0.5e-3F, 0.3e-3F) : 3e-3F, 1e-6F);
+    EXPECT_NEAR(map.map().points[i].sigma, i < 10 ? std::sqrt(0.5e-6F / 16 + 0.09e-6F) : 3e-3F, 1e-6F);
   }
   EXPECT_NEAR(map.lengths().moved_m, 0.1, 1e-6);
   EXPECT_NEAR(map.lengths().kept_m, 0.1, 1e-6);
@@ -119,19 +118,19 @@ TEST(LearningMap, AMarkingStaysIfEventsTellItsPlaceAndContrast) {
   }
 }
 
-TEST(LearningMap, AMarkingMovesWithItsPlaneAndIsFreeAlongIt) {
-  LearningMap map(two_rims());
-  map.add_markings(marking(0.53F));
-  const ContourSegments segments = cut_into_segments(map.map());
+TEST(LearningMap, ANewMarkingIsFreeAndOneOfAnEarlierFlightIsHeldByItsSigma) {
+  LearningMap first(two_rims());
+  first.add_markings(marking(0.53F));
+  ContourSegments segments = cut_into_segments(first.map());
+  EXPECT_GT(first.landmarks(segments)[segments.of_point[25]].sigma_m.minCoeff(), 0.02);
   AdjustmentResult result = nothing_told(segments.count);
   result.landmarks[segments.of_point[25]] = good(0);
-  result.planes_m = {0.4e-3};
-  map.apply(result, segments, seen(map, 1));
-  EXPECT_NEAR(map.map().points[25].position.z(), 0.05F + 0.4e-3F, 1e-6F);
-  const Landmark l = map.landmarks(segments)[segments.of_point[25]];
-  EXPECT_NEAR(l.moved_m.norm(), 0, 1e-6);  // that was the plane's move
-  EXPECT_GT(l.sigma_m(0), 0.05);
-  EXPECT_NEAR(map.planes()[0].moved_m, 0.4e-3, 1e-9);
+  first.apply(result, segments, seen(first, 1));
+  const LearningMap second(first.map());
+  segments = cut_into_segments(second.map());
+  const Landmark held = second.landmarks(segments)[segments.of_point[25]];
+  EXPECT_NEAR(held.sigma_m(0), static_cast<double>(second.map().points[25].sigma), 1e-9);
+  EXPECT_TRUE(held.doubtful);
 }
 
 }  // namespace

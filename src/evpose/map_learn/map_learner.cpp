@@ -19,6 +19,9 @@ constexpr int kSmoothings = 2;
 constexpr int kPasses = 3;            // of looking for markings and adjusting
 constexpr double kLeastTracked = 0.5;  // of a flight that is of this map
 constexpr double kDegree = 57.29577951;
+// A flight that tells less than this says nothing that the cloud does not know.
+constexpr double kLeastSpread_deg = 1;
+constexpr double kWorstCommon_m = 0.01;
 
 /// What is known of the first state beside the recording: little, so that the cloud alone gives the frame.
 Vector15d start_sigma() {
@@ -41,9 +44,9 @@ class FlightLearner {
   Status smooth();
   Status find_markings_of_flight();
   Status adjust_once();
+  Status check_worth() const;
   void use(const ContourMap& map);
-  void report(const AdjustmentResult& result, const FlightObservations& seen,
-              const std::vector<Landmark>& landmarks);
+  void report(const AdjustmentResult& result, const FlightObservations& seen);
   /// Of the steps of the work: the share of the present one, 0..1.
   bool go_on(double share) {
     constexpr double kSteps = 1 + kSmoothings + 2 * kPasses;
@@ -101,7 +104,6 @@ Status FlightLearner::smooth() {
   }
   ++steps_done_;
   trajectory_ = estimator.trajectory();
-  const auto map = job_->map;
   job_ = estimator.at_present_values();
   return {};
 }
@@ -126,7 +128,6 @@ Status FlightLearner::adjust_once() {
   problem.steps = seen->steps;
   problem.start_sigma = start_sigma();
   problem.landmarks = learning_.landmarks(segments);
-  problem.planes = learning_.planes();
   problem.observations = seen->observations;
   std::vector<Eigen::Matrix3d> rotations;
   for (const std::size_t k : seen->knots) rotations.push_back(trajectory_[k].nav.T_map_body.rotation());
@@ -138,7 +139,7 @@ Status FlightLearner::adjust_once() {
     trajectory_[i].covariance.topLeftCorner<6, 6>() = result.pose_covariances[knot];
   }
   learning_.apply(result, segments, *seen);
-  report(result, *seen, problem.landmarks);
+  report(result, *seen);
   return {};
 }
 
@@ -160,22 +161,7 @@ double median_spread_rad(const FlightObservations& seen) {
   return *middle;
 }
 
-/// Directions of planes, more than 30 degrees apart, on which markings were told.
-int count_plane_directions(const LearningMap& map) {
-  constexpr double kApart = 0.87;
-  std::vector<Eigen::Vector3f> directions;
-  for (const ContourPoint& p : map.map().points) {
-    if (p.kind != ContourKind::marking || p.plane_a < 0) continue;
-    const Eigen::Vector3f& n = map.map().planes[static_cast<std::size_t>(p.plane_a)].normal;
-    if (std::none_of(directions.begin(), directions.end(),
-                     [&](const Eigen::Vector3f& d) { return std::abs(d.dot(n)) > kApart; }))
-      directions.push_back(n);
-  }
-  return static_cast<int>(directions.size());
-}
-
-void FlightLearner::report(const AdjustmentResult& result, const FlightObservations& seen,
-                           const std::vector<Landmark>&) {
+void FlightLearner::report(const AdjustmentResult& result, const FlightObservations& seen) {
   if (report_.explained_before == 0) report_.explained_before = seen.explained;
   report_.explained_after = seen.explained;
   report_.view_spread_deg = kDegree * median_spread_rad(seen);
@@ -184,12 +170,21 @@ void FlightLearner::report(const AdjustmentResult& result, const FlightObservati
   report_.common_sigma_m = eigen.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
   report_.common_axes = eigen.eigenvectors().rowwise().reverse();
   report_.common_rotation_sigma_rad = std::sqrt(result.common_covariance.bottomRightCorner<3, 3>().trace() / 3);
-  report_.plane_directions = count_plane_directions(learning_);
   report_.lengths = learning_.lengths();
   log_detail(text("pass: ", seen.observations.size(), " observations, common sigma ",
                   1e3 * report_.common_sigma_m.x(), " mm, delay ", result.delay_px, " px, explained ",
                   seen.explained, ", moved ", report_.lengths.moved_m, " m, struck ", report_.lengths.struck_m,
                   " m, new ", report_.lengths.new_m, " m"));
+}
+
+Status FlightLearner::check_worth() const {
+  const double spread_deg = report_.view_spread_deg, common_m = report_.common_sigma_m.x();
+  if (spread_deg >= kLeastSpread_deg && common_m <= kWorstCommon_m) return {};
+  return Error{request_.recording,
+               text("tells nothing that the map does not know: its contours were seen from directions ",
+                    std::round(10 * spread_deg) / 10, " deg apart, and what was learnt stands within ",
+                    std::round(1e4 * common_m) / 10, " mm (1 sigma)"),
+               "learn from a flight that passes the contours, sideways or up and down"};
 }
 
 Expected<LearntMap> FlightLearner::learn() {
@@ -203,6 +198,7 @@ Expected<LearntMap> FlightLearner::learn() {
     if (auto ok = adjust_once(); !ok) return ok.error();
   }
   if (interrupted_) return LearntMap{};
+  if (auto ok = check_worth(); !ok) return ok.error();
   return LearntMap{learning_.map(), report_, trajectory_};
 }
 

@@ -21,11 +21,10 @@ struct FlightReport {
   LearntLengths lengths;
   double view_spread_deg = 0;  ///< typical angle between the directions from which a contour was seen
   double delay_px = 0;         ///< of all events, beside the edge delay
-  /// What ties the result to the cloud's frame: of all that was learnt together, position (map frame).
+  /// How well the cloud's contours tie all that was learnt, together, to the cloud's frame.
   Eigen::Vector3d common_sigma_m = Eigen::Vector3d::Zero();  ///< weakest first
   Eigen::Matrix3d common_axes = Eigen::Matrix3d::Identity();  ///< columns, of these
   double common_rotation_sigma_rad = 0;
-  int plane_directions = 0;  ///< seen: 3 tie the frame without trusting a contour
 };
 
 /// What a pass over a flight is told, 0..1; false ends it.

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""docs/results/learn.md: maps that flights have made better, beside the built and the true ones."""
+import json
+import shutil
+
+import harness
+import tables
+
+# One flight learns, others of the same place are tracked.
+LEARNS, TRACKED = "room_spiral", ["room_hover", "room_people", "room_720p"]
+# The first part learns, the rest is tracked: seconds of the first.
+SPLIT = {"courtyard_landing": 2.4, "room_other_view": 1.5, "room_c": 0.65, "room_e": 0.65, "courtyard_b": 0.65}
+
+
+def cell(row):
+    if "ate_mean_mm" not in row:
+        return row.get("why", "-")
+    mark = "" if row["tracking"] > 0.995 else f", tracking {100 * row['tracking']:.0f} %"
+    return f"{row['ate_mean_mm']:.2f}, {row['are_mean_deg']:.3f}, {row['nees']:.2f}{mark}"
+
+
+def track(bench, folder, truth, contours, scratch, *extra):
+    """After 0.3 s, but for NEES/6, which is of the whole run."""
+    summary = bench.track(folder, contours, scratch / "run", "--init", "groundtruth", *extra)
+    later = bench.later_accuracy(scratch / "run", truth) or {}
+    nees = (summary.get("accuracy") or {}).get("nees6_mean")
+    return {**later, "nees": nees, "tracking": summary["tracking_share"]}
+
+
+def learn(bench, built, folder, truth, scratch):
+    """The learnt map, or none; what the flight told; how good its own trajectory became."""
+    learnt = scratch / "learnt.h5"
+    try:
+        bench.run("map", "learn", built, folder, "-o", learnt, "--trajectories", scratch / "flights", "--init", "groundtruth",
+                  "--set", "fusion.calibration.on=false")
+    except harness.Failure as why:
+        return None, {"refused": str(why).split(": ", 2)[-1]}
+    told = json.loads((scratch / "learnt.h5.json").read_text())
+    own = json.loads(bench.run("eval", scratch / "flights/flight_0.tum", truth, "--from", harness.START_S, "--json"))
+    return learnt, {**told["flights"][0], "own": own.get("accuracy", own), "processor_s": told["processor_s"],
+                    "memory_mb": told["peak_memory_mb"]}
+
+
+def compare(bench, folder, recording, built, learnt, scratch):
+    return {"built": track(bench, folder, recording.truth, built, scratch),
+            "learnt": track(bench, folder, recording.truth, learnt, scratch) if learnt else {"why": "refused"},
+            "true": track(bench, folder, recording.truth, recording.contours, scratch, "--occluders", recording.mesh)}
+
+
+def cloud_of(bench, recording):
+    own = recording.folder / "cloud.ply"
+    return own if own.exists() else recording.mesh.with_name(recording.mesh.name.replace("_mesh", "_map_raw"))
+
+
+def measure_others(bench):
+    with bench.folder() as scratch:
+        teacher = bench.peer(LEARNS)
+        bench.run("map", "build", cloud_of(bench, teacher), "-o", scratch / "built.h5")
+        learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
+        tracked = {name: compare(bench, bench.peer(name).folder, bench.peer(name), scratch / "built.h5", learnt, scratch)
+                   for name in TRACKED}
+    return {"told": told, "tracked": tracked}
+
+
+def measure_split(bench, recording, seconds):
+    with bench.folder() as scratch:
+        bench.run("map", "build", cloud_of(bench, recording), "-o", scratch / "built.h5")
+        bench.run("convert", recording.folder, scratch / "first", "--duration", seconds)
+        bench.run("convert", recording.folder, scratch / "second", "--start", seconds)
+        for part in ("first", "second"):
+            if not (scratch / part / "groundtruth.tum").exists():
+                shutil.copy(recording.truth, scratch / part / "groundtruth.tum")
+        learnt, told = learn(bench, scratch / "built.h5", scratch / "first", recording.truth, scratch)
+        return {"told": told, "tracked": compare(bench, scratch / "second", recording, scratch / "built.h5", learnt, scratch)}
+
+
+def told_row(name, told):
+    if "refused" in told:
+        return [name, "-", "-", "-", "refused", "-", "-", "-"]
+    sigma = ", ".join(f"{v:.1f}" for v in told["common_sigma_mm"])
+    own = told["own"]
+    return [name, f"{told['seconds']:.1f}", f"{told['view_spread_deg']:.1f}",
+            f"{told['moved_m']:.0f}, {told['struck_m']:.1f}, {told['new_m']:.0f}", sigma,
+            f"{own['ate_mean_mm']:.2f}, {own['are_mean_deg']:.3f}", f"{told['processor_s'] / told['seconds']:.1f}",
+            f"{told['memory_mb']:.0f}"]
+
+
+def make(bench):
+    others = bench.once("learn: other flights", lambda: measure_others(bench))
+    recordings = {r.name: r for r in bench.peers() + bench.more_peers()}
+    split = {name: bench.once(f"learn: {name}", lambda: measure_split(bench, recordings[name], seconds))
+             for name, seconds in SPLIT.items() if name in recordings}
+    told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items())]
+    heads = ["flight", "s", "views deg apart", "moved, struck, new m", "common sigma mm", "own trajectory mm, deg",
+             "processor s per s", "memory MB"]
+    return bench.write_page("learn", {
+        "other flights": tables.transposed(others["tracked"], cell),
+        "second parts": tables.transposed({name: m["tracked"] for name, m in split.items()}, cell),
+        "flights": tables.table(heads, told)})

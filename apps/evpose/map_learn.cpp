@@ -36,20 +36,21 @@ std::string axis_words(const Eigen::Vector3d& axis) {
 
 nlohmann::ordered_json as_json(const FlightReport& r) {
   const Eigen::Vector3d axis = r.common_axes.col(0);
-  return {{"recording", r.recording},
-          {"seconds", r.seconds},
-          {"tracking_share", r.tracked},
-          {"explained_events_before", r.explained_before},
-          {"explained_events_after", r.explained_after},
-          {"kept_m", r.lengths.kept_m},
-          {"moved_m", r.lengths.moved_m},
-          {"struck_m", r.lengths.struck_m},
-          {"new_m", r.lengths.new_m},
-          {"view_spread_deg", r.view_spread_deg},
-          {"delay_px", r.delay_px},
-          {"common_sigma_mm", {1e3 * r.common_sigma_m(0), 1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2)}},
-          {"weakest_direction", {axis.x(), axis.y(), axis.z()}},
-          {"common_rotation_sigma_deg", r.common_rotation_sigma_rad * 57.29577951}};
+  return {
+      {"recording", r.recording},
+      {"seconds", r.seconds},
+      {"tracking_share", r.tracked},
+      {"explained_events_before", r.explained_before},
+      {"explained_events_after", r.explained_after},
+      {"kept_m", r.lengths.kept_m},
+      {"moved_m", r.lengths.moved_m},
+      {"struck_m", r.lengths.struck_m},
+      {"new_m", r.lengths.new_m},
+      {"view_spread_deg", r.view_spread_deg},
+      {"delay_px", r.delay_px},
+      {"common_sigma_mm", {1e3 * r.common_sigma_m(0), 1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2)}},
+      {"weakest_direction", {axis.x(), axis.y(), axis.z()}},
+      {"common_rotation_sigma_deg", r.common_rotation_sigma_rad * 57.29577951}};
 }
 
 void print_flight(const FlightReport& r) {
@@ -60,9 +61,8 @@ void print_flight(const FlightReport& r) {
       "frame      all together stand within %.1f mm (1 sigma) along %s, %.1f and %.1f mm across, %.3f deg\n",
       r.recording.c_str(), r.seconds, 100 * r.tracked, r.view_spread_deg, r.lengths.moved_m,
       r.lengths.struck_m, r.lengths.new_m, r.lengths.kept_m, 100 * r.explained_after,
-      100 * r.explained_before, 1e3 * r.common_sigma_m(0),
-      axis_words(r.common_axes.col(0)).c_str(), 1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2),
-      r.common_rotation_sigma_rad * 57.29577951);
+      100 * r.explained_before, 1e3 * r.common_sigma_m(0), axis_words(r.common_axes.col(0)).c_str(),
+      1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2), r.common_rotation_sigma_rad * 57.29577951);
   std::fflush(stdout);
 }
 
@@ -108,7 +108,8 @@ int learn(const LearnRequest& request) {
     print_flight(learnt->report);
     flights.push_back(as_json(learnt->report));
     if (!request.trajectories.empty())
-      if (const auto ok = write_trajectory(request.trajectories, *learnt, i); !ok) return bad_input(ok.error());
+      if (const auto ok = write_trajectory(request.trajectories, *learnt, i); !ok)
+        return bad_input(ok.error());
     *map = std::move(learnt->map);
   }
   if (const auto ok = write_map_h5(request.output, *map, "", *placement); !ok) return bad_input(ok.error());

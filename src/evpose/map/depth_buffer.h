@@ -32,8 +32,8 @@ class DepthBuffer {
   /// much nearer silhouette count as hidden: which of the two an event belongs to is open.
   bool hides(const Eigen::Vector3d& point_cam) const;
 
-  /// The triangle that is seen at (x / z, y / z), by its number in the map, at the nearest cell; none: nothing
-  /// is.
+  /// The triangle that is seen at (x / z, y / z), by its number in the map, at the nearest cell; none:
+  /// nothing is.
   std::optional<std::uint32_t> triangle_at(const Eigen::Vector2f& tangents) const;
 
  private:

@@ -23,8 +23,7 @@ using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
 /// Where each unknown stands.
 struct Layout {
-  explicit Layout(const AdjustmentProblem& p)
-      : delay(15 * static_cast<Index>(p.knots())), size(delay + 1) {}
+  explicit Layout(const AdjustmentProblem& p) : delay(15 * static_cast<Index>(p.knots())), size(delay + 1) {}
   Index delay, size;
 };
 

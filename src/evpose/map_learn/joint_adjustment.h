@@ -54,7 +54,7 @@ struct LandmarkEstimate {
   Eigen::Vector2d move_m = Eigen::Vector2d::Zero();      ///< along its directions
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of its place, the trajectory's share included
   double seen_variance_m2 = 0;  ///< of it across the contour in the image, from where it was seen
-  double chi2 = 0;      ///< mean of (residual / sigma)^2 of its observations, cut off at 9
+  double chi2 = 0;              ///< mean of (residual / sigma)^2 of its observations, cut off at 9
   int observations = 0;
   double delay_px = 0;  ///< of its events, beside that of all
 };

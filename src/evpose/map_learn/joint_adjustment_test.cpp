@@ -71,7 +71,8 @@ struct Dense {
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(15, H.rows());
       J.block<15, 15>(0, 15 * k) = -p.steps[static_cast<std::size_t>(k)].transition;
       J.block<15, 15>(0, 15 * k + 15).setIdentity();
-      add(J, -p.steps[static_cast<std::size_t>(k)].offset, p.steps[static_cast<std::size_t>(k)].noise.inverse());
+      add(J, -p.steps[static_cast<std::size_t>(k)].offset,
+          p.steps[static_cast<std::size_t>(k)].noise.inverse());
     }
     prior(delay, 0, p.delay_sigma_px);
     for (int j = 0; j < static_cast<int>(p.landmarks.size()); ++j) {
@@ -103,7 +104,8 @@ TEST(JointAdjustment, EliminationSolvesTheFullNormalEquations) {
   const AdjustmentResult result = adjust(p, std::vector<Eigen::Matrix3d>(5, Eigen::Matrix3d::Identity()), 0);
   for (int k = 0; k < 5; ++k) {
     EXPECT_LT((result.states[static_cast<std::size_t>(k)] - x.segment<15>(15 * k)).norm(), 1e-9);
-    EXPECT_LT((result.pose_covariances[static_cast<std::size_t>(k)] - covariance.block<6, 6>(15 * k, 15 * k)).norm(),
+    EXPECT_LT((result.pose_covariances[static_cast<std::size_t>(k)] - covariance.block<6, 6>(15 * k, 15 * k))
+                  .norm(),
               1e-12);
   }
   EXPECT_NEAR(result.delay_px, x(dense.delay), 1e-9);
@@ -151,7 +153,8 @@ Known make_consistent(AdjustmentProblem& p, unsigned seed, double noise_px) {
     l.sigma_m = {2e-3, 0.5e-3};
   }
   for (Observation& o : p.observations) {
-    const Vector6d pose = (1 - o.share) * known.states[o.knot].head<6>() + o.share * known.states[o.knot + 1].head<6>();
+    const Vector6d pose =
+        (1 - o.share) * known.states[o.knot].head<6>() + o.share * known.states[o.knot + 1].head<6>();
     const Eigen::Vector3d moved = p.landmarks[o.landmark].directions * known.landmarks[o.landmark];
     o.offset_px = o.by_pose.dot(pose) + o.by_point.dot(moved) + noise_px * normal(random);
     o.variance_px = noise_px * noise_px;
@@ -164,7 +167,8 @@ TEST(JointAdjustment, ShiftedContoursAndTrajectoryComeBackWithinTheirSigma) {
   for (unsigned seed = 0; seed < 10; ++seed) {
     AdjustmentProblem p = drawn_problem(seed, 6, 60);
     const Known known = make_consistent(p, 100 + seed, 0.2);
-    const AdjustmentResult result = adjust(p, std::vector<Eigen::Matrix3d>(6, Eigen::Matrix3d::Identity()), 0);
+    const AdjustmentResult result =
+        adjust(p, std::vector<Eigen::Matrix3d>(6, Eigen::Matrix3d::Identity()), 0);
     for (std::size_t j = 0; j < 60; ++j) {
       const Eigen::Vector2d e = result.landmarks[j].move_m - known.landmarks[j];
       square += e.dot(result.landmarks[j].covariance.inverse() * e) / 2;
@@ -179,7 +183,8 @@ TEST(JointAdjustment, ShiftedContoursAndTrajectoryComeBackWithinTheirSigma) {
 
 TEST(JointAdjustment, ContoursOnAnotherEdgeDoNotPullTheTrajectory) {
   AdjustmentProblem p = drawn_problem(3, 6, 60);
-  for (Observation& o : p.observations) o.by_pose.head<3>() = -o.by_point;  // a shift of all is one of the camera
+  for (Observation& o : p.observations)
+    o.by_pose.head<3>() = -o.by_point;  // a shift of all is one of the camera
   const Known known = make_consistent(p, 7, 0.1);
   for (KnotStep& step : p.steps) step.noise = Matrix15d::Identity();  // contours alone hold the poses
   for (Observation& o : p.observations)                               // every sixth stands 30 mm off

@@ -9,8 +9,8 @@ namespace evpose::map_learn {
 namespace {
 
 // Of what a cloud's map says of a contour, beside the sigma that it states.
-constexpr double kContour_m = 2e-3;   // across it: some stand on another edge, and count less then
-constexpr double kSurface_m = 1e-3;   // of a rim along the normal of its face
+constexpr double kContour_m = 2e-3;  // across it: some stand on another edge, and count less then
+constexpr double kSurface_m = 1e-3;  // of a rim along the normal of its face
 // Of a marking: nothing is known along its plane. Across it the parallax tells more than a built plane, whose
 // faces stand some millimetres off here and there and would bend the trajectory.
 constexpr double kAlongPlane_m = 0.1, kOffPlane_m = 0.03;
@@ -51,7 +51,8 @@ void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
 
 std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) const {
   std::vector<Landmark> out(segments.count);
-  std::vector<Eigen::Vector3d> moved(segments.count, Eigen::Vector3d::Zero()), tangent = moved, normal = moved;
+  std::vector<Eigen::Vector3d> moved(segments.count, Eigen::Vector3d::Zero()), tangent = moved,
+                                                                               normal = moved;
   std::vector<double> points(segments.count, 0), sigma(segments.count, 0);
   std::vector<const Record*> record(segments.count, nullptr);
   std::vector<const ContourPoint*> example(segments.count, nullptr);
@@ -79,7 +80,8 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
       l.doubtful = !record[s]->is_new;
     } else {
       const double across = std::hypot(stated, kContour_m);
-      l.sigma_m = {across, example[s]->kind == ContourKind::boundary ? std::hypot(stated, kSurface_m) : across};
+      l.sigma_m = {across,
+                   example[s]->kind == ContourKind::boundary ? std::hypot(stated, kSurface_m) : across};
     }
     l.moved_m = l.directions.transpose() * (moved[s] / points[s]);
   }
@@ -96,7 +98,8 @@ Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool c
   const bool sure = e.chi2 < kWorstChi2 && std::abs(e.delay_px) < kLargestDelay_px;
   if (!marking) return sure ? Verdict::good : Verdict::wrong;
   const double height = l.moved_m(1) + e.move_m(1);
-  return sure && contrast_is_known && std::abs(height) < kLargestHeight_m + 3 * std::sqrt(e.covariance(1, 1)) &&
+  return sure && contrast_is_known &&
+                 std::abs(height) < kLargestHeight_m + 3 * std::sqrt(e.covariance(1, 1)) &&
                  std::sqrt(e.seen_variance_m2) < kLargestSigma_m
              ? Verdict::good
              : Verdict::wrong;
@@ -122,8 +125,7 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     Record& record = records_[i];
     const bool marking = p.kind == ContourKind::marking;
     const LandmarkEstimate& e = result.landmarks[s];
-    const Verdict verdict =
-        judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
+    const Verdict verdict = judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
     if (verdict == Verdict::good) {
       take(e, unknowns[s], i);
       p.contrast = observed.map.points[i].contrast;

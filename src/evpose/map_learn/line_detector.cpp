@@ -25,7 +25,8 @@ std::vector<float> blurred(const CountImage& image, double sigma) {
   const int r = static_cast<int>(std::ceil(3 * sigma));
   std::vector<float> kernel;
   float sum = 0;
-  for (int k = -r; k <= r; ++k) sum += kernel.emplace_back(std::exp(-0.5F * static_cast<float>(k * k / (sigma * sigma))));
+  for (int k = -r; k <= r; ++k)
+    sum += kernel.emplace_back(std::exp(-0.5F * static_cast<float>(k * k / (sigma * sigma))));
   for (float& k : kernel) k /= sum;
   const auto pass = [&](const std::vector<float>& from, int dx, int dy) {
     std::vector<float> to(from.size(), 0);
@@ -113,9 +114,9 @@ void Detector::grow(std::size_t seed, std::vector<std::size_t>& line) {
       for (int dx = -2; dx <= 2; ++dx) {
         const int x = here.x + dx, y = here.y + dy;
         if (x < 0 || y < 0 || x >= smooth_.width || y >= smooth_.height) continue;
-        const std::int32_t other = ridge_at_[static_cast<std::size_t>(y) *
-                                                 static_cast<std::size_t>(smooth_.width) +
-                                             static_cast<std::size_t>(x)];
+        const std::int32_t other =
+            ridge_at_[static_cast<std::size_t>(y) * static_cast<std::size_t>(smooth_.width) +
+                      static_cast<std::size_t>(x)];
         if (other < 0 || taken_[static_cast<std::size_t>(other)]) continue;
         const Ridge& r = ridges_[static_cast<std::size_t>(other)];
         const Eigen::Vector2d way = r.point - first.point;
@@ -181,9 +182,8 @@ std::vector<RidgeLine> Detector::detect(double apart_cells) {
     grow(seed, line);
     fit(line);
   }
-  std::stable_sort(lines_.begin(), lines_.end(), [](const RidgeLine& a, const RidgeLine& b) {
-    return a.significance > b.significance;
-  });
+  std::stable_sort(lines_.begin(), lines_.end(),
+                   [](const RidgeLine& a, const RidgeLine& b) { return a.significance > b.significance; });
   std::vector<RidgeLine> kept;
   for (const RidgeLine& l : lines_)
     if (std::none_of(kept.begin(), kept.end(),

@@ -19,8 +19,8 @@ struct CountImage {
 
 /// A straight ridge of counts, in cells.
 struct RidgeLine {
-  Eigen::Vector2d a, b;  ///< its ends
-  double contrast = 0;   ///< peak over what lies beside it, counts a cell
+  Eigen::Vector2d a, b;     ///< its ends
+  double contrast = 0;      ///< peak over what lies beside it, counts a cell
   double significance = 0;  ///< of the whole line, in sigmas of counting
 };
 

@@ -20,8 +20,8 @@ CountImage background(int width, int height, double level, std::mt19937& random)
 }
 
 /// Events scattered by `sigma` cells about the line from a to b.
-void add_line(CountImage& image, const Eigen::Vector2d& a, const Eigen::Vector2d& b, double per_cell, double sigma,
-              std::mt19937& random) {
+void add_line(CountImage& image, const Eigen::Vector2d& a, const Eigen::Vector2d& b, double per_cell,
+              double sigma, std::mt19937& random) {
   std::normal_distribution<double> across(0, sigma);
   std::uniform_real_distribution<double> along(0, 1);
   const Eigen::Vector2d way = b - a, n = Eigen::Vector2d(-way.y(), way.x()).normalized();

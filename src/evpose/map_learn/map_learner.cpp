@@ -16,7 +16,7 @@ namespace evpose::map_learn {
 namespace {
 
 constexpr int kSmoothings = 2;
-constexpr int kPasses = 3;            // of looking for markings and adjusting
+constexpr int kPasses = 3;             // of looking for markings and adjusting
 constexpr double kLeastTracked = 0.5;  // of a flight that is of this map
 constexpr double kDegree = 57.29577951;
 // A flight that tells less than this says nothing that the cloud does not know.
@@ -148,8 +148,8 @@ double median_spread_rad(const FlightObservations& seen) {
   std::vector<double> spreads;
   for (std::size_t i = 0, end = 0; i < seen.observations.size(); i = end) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (end = i; end < seen.observations.size() &&
-                  seen.observations[end].landmark == seen.observations[i].landmark;
+    for (end = i;
+         end < seen.observations.size() && seen.observations[end].landmark == seen.observations[i].landmark;
          ++end)
       sum += seen.views[end];
     const auto count = static_cast<double>(end - i);
@@ -169,12 +169,13 @@ void FlightLearner::report(const AdjustmentResult& result, const FlightObservati
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(result.common_covariance.topLeftCorner<3, 3>());
   report_.common_sigma_m = eigen.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
   report_.common_axes = eigen.eigenvectors().rowwise().reverse();
-  report_.common_rotation_sigma_rad = std::sqrt(result.common_covariance.bottomRightCorner<3, 3>().trace() / 3);
+  report_.common_rotation_sigma_rad =
+      std::sqrt(result.common_covariance.bottomRightCorner<3, 3>().trace() / 3);
   report_.lengths = learning_.lengths();
   log_detail(text("pass: ", seen.observations.size(), " observations, common sigma ",
                   1e3 * report_.common_sigma_m.x(), " mm, delay ", result.delay_px, " px, explained ",
-                  seen.explained, ", moved ", report_.lengths.moved_m, " m, struck ", report_.lengths.struck_m,
-                  " m, new ", report_.lengths.new_m, " m"));
+                  seen.explained, ", moved ", report_.lengths.moved_m, " m, struck ",
+                  report_.lengths.struck_m, " m, new ", report_.lengths.new_m, " m"));
 }
 
 Status FlightLearner::check_worth() const {

@@ -22,7 +22,7 @@ struct FlightReport {
   double view_spread_deg = 0;  ///< typical angle between the directions from which a contour was seen
   double delay_px = 0;         ///< of all events, beside the edge delay
   /// How well the cloud's contours tie all that was learnt, together, to the cloud's frame.
-  Eigen::Vector3d common_sigma_m = Eigen::Vector3d::Zero();  ///< weakest first
+  Eigen::Vector3d common_sigma_m = Eigen::Vector3d::Zero();   ///< weakest first
   Eigen::Matrix3d common_axes = Eigen::Matrix3d::Identity();  ///< columns, of these
   double common_rotation_sigma_rad = 0;
 };

@@ -11,14 +11,14 @@
 namespace evpose::map_learn {
 namespace {
 
-constexpr double kPacket_s = 2.5e-4;              // events of one pose: the image moves by less than 0.1 px
-constexpr TimeNs kRedraw = 10 * kNsPerMs;         // of the planes that are seen
-constexpr double kCell_px = 0.5;                  // of the grid on a plane
+constexpr double kPacket_s = 2.5e-4;       // events of one pose: the image moves by less than 0.1 px
+constexpr TimeNs kRedraw = 10 * kNsPerMs;  // of the planes that are seen
+constexpr double kCell_px = 0.5;           // of the grid on a plane
 constexpr double kSmallestCell_m = 1e-3;
-constexpr std::size_t kMostCells = 24'000'000;    // of one plane: 100 MB
-constexpr std::size_t kFewEvents = 300;           // of a sampled plane, that are not worth an image
-constexpr int kSampledPackets = 16;               // of so many, one tells what is seen of the planes
-constexpr double kGrazing = 0.17;                 // sine of the angle to the plane below which it is not read
+constexpr std::size_t kMostCells = 24'000'000;  // of one plane: 100 MB
+constexpr std::size_t kFewEvents = 300;         // of a sampled plane, that are not worth an image
+constexpr int kSampledPackets = 16;             // of so many, one tells what is seen of the planes
+constexpr double kGrazing = 0.17;               // sine of the angle to the plane below which it is not read
 
 /// What the pixels of a camera see of a map's planes.
 class PlaneView {
@@ -49,9 +49,9 @@ class PlaneView {
     double pixel_m;
   };
   std::optional<Hit> hit(int x, int y) const {
-    const Eigen::Vector3d& ray = rays_[static_cast<std::size_t>(y) *
-                                           static_cast<std::size_t>(camera_.size().width) +
-                                       static_cast<std::size_t>(x)];
+    const Eigen::Vector3d& ray =
+        rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.size().width) +
+              static_cast<std::size_t>(x)];
     if (ray.z() == 0) return std::nullopt;
     const auto triangle = buffer_.triangle_at(ray.head<2>().cast<float>());
     if (!triangle) return std::nullopt;
@@ -139,7 +139,8 @@ struct Extent {
   std::size_t events = 0;
 };
 
-std::optional<PlaneEvents> make_plane(int plane, const Extent& extent, const Eigen::Vector3d& normal, double d) {
+std::optional<PlaneEvents> make_plane(int plane, const Extent& extent, const Eigen::Vector3d& normal,
+                                      double d) {
   if (extent.events < kFewEvents) return std::nullopt;
   PlaneEvents out;
   out.plane = plane;
@@ -169,7 +170,8 @@ constexpr float kParallel = 0.9F;
 class ContourNeighbours {
  public:
   explicit ContourNeighbours(const ContourMap& map) : map_(map) {
-    for (std::uint32_t i = 0; i < map.points.size(); ++i) sorted_.emplace_back(key(map.points[i].position), i);
+    for (std::uint32_t i = 0; i < map.points.size(); ++i)
+      sorted_.emplace_back(key(map.points[i].position), i);
     std::sort(sorted_.begin(), sorted_.end());
   }
   bool beside(const Eigen::Vector3f& p, const Eigen::Vector3f& tangent, float within_m) const {

@@ -38,7 +38,7 @@ struct LearntMap {
 };
 
 /// Smooths the recording of `request` with `map` in place of the request's, finds markings on its planes, and
-/// adjusts trajectory, contours, markings and planes together. Interrupted: an empty map. Errors: of the
+/// adjusts trajectory, contours and markings together. Interrupted: an empty map. Errors: of the
 /// recording; no IMU; a flight that was lost, or that tells nothing.
 Expected<LearntMap> learn_from_flight(const TrackRequest& request, const ContourMap& map,
                                       const LearnProgress& progress);

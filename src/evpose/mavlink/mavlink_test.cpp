@@ -327,32 +327,6 @@ TEST(MavlinkReporter, LostIsSaidThenSilence) {
   EXPECT_EQ(std::string(texts[2].text.data()), "evpose: lost");
 }
 
-TEST(MavlinkReporter, LongWordsComeInChunksThatJoinToTheWhole) {
-  for (const std::size_t length : {1U, 41U, 42U, 43U, 92U, 200U}) {
-    Wire wire;
-    Reporter reporter({}, {}, wire.send());
-    std::string words;
-    for (std::size_t i = 0; words.size() < length; ++i) words += static_cast<char>('a' + i % 26);
-    reporter.stalled(words);
-    reporter.stalled(words);
-    const std::string whole = "evpose: " + words;
-    const auto sent = wire.all<Statustext>();
-    const std::size_t chunks = sent.size() / 2;
-    EXPECT_EQ(chunks, whole.size() <= 50 ? 1 : whole.size() / 50 + 1);
-    EXPECT_EQ(sent.front().id != 0, whole.size() > 50);
-    if (chunks > 1) EXPECT_NE(sent.front().id, sent.back().id) << "each text has a number of its own";
-    std::string joined;
-    for (std::size_t k = 0; k < chunks; ++k) {
-      EXPECT_EQ(sent[k].chunk_seq, k);
-      EXPECT_EQ(sent[k].id, sent.front().id);
-      const std::string part(sent[k].text.begin(), std::find(sent[k].text.begin(), sent[k].text.end(), '\0'));
-      EXPECT_TRUE(chunks == 1 || (part.size() == 50) == (k + 1 < chunks)) << "only the last ends with zero";
-      joined += part;
-    }
-    EXPECT_EQ(joined, whole);
-  }
-}
-
 TEST(MavlinkReporter, JumpsAreCountedMotionIsNot) {
   Wire wire;
   MavlinkConfig config;

@@ -4,6 +4,10 @@
 Clouds are the shared hall (1.2 million points, 30 x 40 m), cut to size or repeated side by side in a square. PCL's program
 (libpcl-dev, pkg-config and a compiler; left out by name without them) does normals and region growing, with as many
 neighbours and threads as ours. One thread.
+
+The large clouds are a city of halls, each turned by quarters and blurred by 2 mm from its own seed, planned by `evpose map
+build --plan`, built by GNU parallel (examples/map_tiles_parallel.sh, one job for each core) and merged. The largest takes
+most of an hour and 6 GB of disk.
 """
 import os
 import pathlib
@@ -21,6 +25,9 @@ import tables
 
 MILLIONS = [0.1, 1, 10]
 PCL_MILLIONS = 1  # and no more: it has no tiles
+CITY_MILLIONS = [1, 10, 100]
+COMPARED_MILLIONS = 10  # and no more: these are built in one run, too
+CITY_PITCH_M = 44
 PCL_MODULES = ["pcl_features", "pcl_segmentation", "pcl_io", "pcl_search"]
 
 
@@ -38,11 +45,28 @@ def repeated(points, count):
             return
 
 
-def measured(command):
-    """Output, processor seconds, elapsed seconds and peak bytes of a command."""
+def city(points, count):
+    """Arrays of points that make `count` together: the same hall in a square of many, none exactly like another."""
+    side = int(np.ceil(np.sqrt(count / len(points))))
+    points = points - points.mean(0)
+    for seed in range(side * side):
+        random = np.random.default_rng(seed)
+        c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][random.integers(4)]
+        turned = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + random.normal(0, 0.002, points.shape)
+        part = (turned + np.array([seed % side, seed // side, 0]) * CITY_PITCH_M)[:count]
+        yield part.astype("<f4")
+        count -= len(part)
+        if count <= 0:
+            return
+
+
+def measured(command, path=None):
+    """Output, processor seconds, elapsed seconds and peak bytes of a command; the peak is that of the largest of its
+    processes. `path`: folder of programs that it may call."""
     start = time.monotonic()
+    environment = dict(os.environ, PATH=f"{path}:{os.environ['PATH']}") if path else None
     with tempfile.TemporaryFile("w+") as output:
-        process = subprocess.Popen([str(word) for word in command], stdout=output)
+        process = subprocess.Popen([str(word) for word in command], stdout=output, env=environment)
         _, status, usage = os.wait4(process.pid, 0)
         elapsed = time.monotonic() - start
         if status != 0:
@@ -84,6 +108,29 @@ def measure(bench, million):
                                      f"{peer_peak / 1e6:.0f}", f"{regions}, {100 * float(share):.0f} %"]}
 
 
+def measure_city(bench, million):
+    """A row of a city that is built tile by tile."""
+    count = int(million * 1e6)
+    with bench.folder() as scratch:
+        cloud, tiles, merged = scratch / "city.ply", scratch / "tiles", scratch / "city.h5"
+        hall = files.Ply(bench.shared / "data/real/clouds/hall_lidar_4cm.ply").points().astype("<f4")
+        files.write_points(cloud, city(hall, count), count)
+        said, _, plan_s, plan_peak = measured([bench.evpose, "-q", "map", "build", cloud, "--plan", tiles])
+        number, largest = re.search(r"tiles +(\d+) of up to (\d+) points", said).groups()
+        script = harness.ROOT / "examples/map_tiles_parallel.sh"
+        _, spent, elapsed, peak = measured(["bash", script, cloud, tiles, merged], path=bench.evpose.parent)
+        _, _, merge_s, merge_peak = measured([bench.evpose, "-q", "map", "merge", tiles, "-o", merged])
+        same = "not tried"
+        if million <= COMPARED_MILLIONS:
+            bench.run("map", "build", cloud, "-o", scratch / "one.h5")
+            same = "yes" if (scratch / "one.h5").read_bytes() == merged.read_bytes() else "NO"
+        jobs = [line.split("\t") for line in (tiles / "jobs.log").read_text().splitlines()[1:]]
+        slowest = max(float(job[3]) for job in jobs)
+        return [count, number, f"{float(largest) / 1e6:.1f}", f"{plan_s:.0f}", f"{plan_peak / 1e6:.0f}", f"{spent:.0f}",
+                f"{spent / million:.1f}", f"{elapsed:.0f}", f"{slowest:.0f}", f"{peak / 1e6:.0f}", f"{merge_s:.0f}",
+                f"{merge_peak / 1e6:.0f}", f"{merged.stat().st_size / 1e6:.0f}", same]
+
+
 def make(bench):
     rows = [bench.once(f"map-scale: {million} million", lambda: measure(bench, million))
             for million in (MILLIONS[:1] if bench.quick else MILLIONS)]
@@ -92,5 +139,12 @@ def make(bench):
     beside = [row["beside"] for row in rows if row["beside"]]
     peer = tables.table(["points", "neighbours", "ours: normals s", "planes s", "peak MB, whole build", "PCL: normals s",
                          "regions s", "peak MB", "regions, share of the points"], beside)
-    return bench.write_page("map-scale", {"ours": ours, "PCL": peer if beside else ["PCL (libpcl-dev) was not there."]},
-                            harness.machine())
+    cities = ["GNU parallel was not there."]
+    if shutil.which("parallel"):
+        cities = tables.table(
+            ["points", "tiles", "largest, million points", "plan s", "MB", "jobs and merge: processor s", "s per million",
+             "elapsed s", "slowest job s", "largest job MB", "merge s", "MB", "map MB", "bytes of one run"],
+            [bench.once(f"map-scale: city of {million} million", lambda: measure_city(bench, million))
+             for million in (CITY_MILLIONS[:1] if bench.quick else CITY_MILLIONS)])
+    return bench.write_page("map-scale", {"ours": ours, "PCL": peer if beside else ["PCL (libpcl-dev) was not there."],
+                                          "city": cities}, harness.machine())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/images/viewer_run.png, viewer_live.png: the pages of `evpose view` and `evpose serve --view` of room_spiral."""
+"""docs/images/viewer_run.png, viewer_live.png, report_desktop.png, report_phone.png: the pages of `evpose view` and
+`evpose serve --view` of room_spiral, and the first screens of its report."""
 import signal
 import socket
 import subprocess
@@ -56,6 +57,15 @@ def shoot(bench, browser, output, words, ready, script=""):
         program.wait()
 
 
+def shoot_report(bench, browser, report):
+    for name, width, height, mobile in (("desktop", WIDTH, HEIGHT, False), ("phone", 390, 844, True)):
+        page = browser.open(report.resolve().as_uri(), width, height, mobile)
+        if not page.wait_for("document.documentElement?.dataset.ready"):
+            raise harness.Failure(f"{report} is never ready")
+        page.screenshot(bench.image(f"report_{name}.png"))
+        page.close()
+
+
 def make(bench):
     name = chromium.find()
     if not name:
@@ -69,6 +79,7 @@ def make(bench):
     with chromium.Browser(name) as browser:
         shoot(bench, browser, output, ["view", run, "--port", free_port()],
               f"Math.abs({DATA}.pictured - {SHOWN_S}) < 0.1", SEEK % SHOWN_S)
+        shoot_report(bench, browser, run / "report.html")
         live = ["serve", recording.folder, *map_words, "--init", "groundtruth", "--set", "replay.speed=0.05",
                 "--view", free_port()]
         shoot(bench, browser, bench.image("viewer_live.png"), live, f"Number({DATA}.t) > {SHOWN_S}")

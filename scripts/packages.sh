@@ -45,6 +45,7 @@ test=(
   python3-rosmaster python3-rospy python3-sensor-msgs python3-nav-msgs python3-geometry-msgs python3-diagnostic-msgs
   python3-tf2-msgs     # drive it
   ffmpeg               # encodes films of a run
+  parallel             # builds the tiles of a map, as the example does
   clang-14 libclang-rt-14-dev  # fuzzing
   chromium             # draws the report
   clang-format-14      # pinned: each version formats differently

@@ -22,17 +22,10 @@
 #include "evpose/report/map_accuracy.h"
 #include "evpose/run/progress.h"
 #include "interrupt.h"
+#include "map_parts.h"
 
 namespace evpose {
 namespace {
-
-struct BuildRequest {
-  std::string cloud, output = "map.h5";
-  std::vector<std::string> assignments;
-  std::vector<double> viewpoints;  ///< x, y, z of one after the other
-  int threads = 1;
-  bool level = false;
-};
 
 constexpr int kSurveyCells = 10;           // along the longer side: a second of work
 constexpr double kSurveyPitch_rad = 0.52;  // 30 deg down
@@ -82,7 +75,7 @@ int build(const BuildRequest& request) {
     return bad_input({"--viewpoint", text("has ", request.viewpoints.size(), " numbers in all"),
                       "give X,Y,Z in metres for each"});
   const auto start = std::chrono::steady_clock::now();
-  auto cloud = read_cloud(request.cloud);
+  auto cloud = read_cloud(request.input);
   if (!cloud) return bad_input(cloud.error());
   for (std::size_t k = 0; k < request.viewpoints.size(); k += 3)
     cloud->viewpoints.emplace_back(&request.viewpoints[k]);
@@ -96,9 +89,6 @@ int build(const BuildRequest& request) {
   progress.done();
   if (InterruptGuard::interrupted()) return kInterruptedStatus;
   if (!built) return bad_input(built.error());
-  const map_build::UpDirection up = map_build::find_up(built->map);
-  if (request.level && up.known) map_build::level(built->map, up.up);
-  if (const auto ok = write_map_h5(request.output, built->map); !ok) return bad_input(ok.error());
   const auto& f = built->figures;
   const auto of = [&](ContourKind kind) { return f.by_kind_m[static_cast<std::size_t>(kind)]; };
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -113,9 +103,7 @@ int build(const BuildRequest& request) {
       100.0 * static_cast<double>(f.in_planes) / static_cast<double>(f.points), f.curved,
       of(ContourKind::crease), of(ContourKind::boundary), f.left_out_m, of(ContourKind::shadow),
       of(ContourKind::cylinder_axis), f.cylinders, f.poles, wall_s, f.normals_s, f.planes_s);
-  print_up(up, request.level);
-  print_verdict(built->map, request.output);
-  return 0;
+  return finish_map(std::move(built->map), request);
 }
 
 void print_score(const char* name, const KindScore& s) {
@@ -176,13 +164,46 @@ int compare(const CompareRequest& request) {
   return 0;
 }
 
+/// By what is asked for: a whole map, a plan, or one tile of one.
+int build_or_plan(const CLI::App& command, const BuildRequest& request, const std::string& plan) {
+  if (command.count("--tile") > 0) {
+    for (const char* other : {"--set", "--viewpoint", "--output", "--level"})
+      if (command.count(other) > 0)
+        return bad_input({other, "does not go with --tile",
+                          "settings are those of the plan, the rest is told to `map merge`"});
+    return build_tile_of(request);
+  }
+  if (command.count("--plan") == 0) return build(request);
+  for (const char* other : {"--viewpoint", "--output", "--level"})
+    if (command.count(other) > 0)
+      return bad_input(
+          {other, "does not go with --plan",
+           "--level and --output are told to `map merge`; shadows need the whole cloud at once"});
+  BuildRequest planned = request;
+  planned.output = plan;
+  return plan_tiles(planned);
+}
+
 }  // namespace
+
+int finish_map(ContourMap map, const BuildRequest& request) {
+  const map_build::UpDirection up = map_build::find_up(map);
+  if (request.level && up.known) map_build::level(map, up.up);
+  if (const auto ok = write_map_h5(request.output, map); !ok) return bad_input(ok.error());
+  print_up(up, request.level);
+  print_verdict(map, request.output);
+  return 0;
+}
 
 void add_map_build(CLI::App& map, std::function<int()>& run) {
   auto request = std::make_shared<BuildRequest>();
+  auto plan = std::make_shared<std::string>();
+  request->output = "map.h5";
   request->threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   auto* command = map.add_subcommand("build", "Make a map from a cloud of surface points (PLY, PCD, LAS)");
-  command->add_option("cloud", request->cloud, "points in metres, of one frame")->required();
+  command
+      ->add_option("cloud", request->input, "points in metres, of one frame; with --tile a folder of tiles")
+      ->required();
   command->add_option("-o,--output", request->output, "map file")->capture_default_str();
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command
@@ -192,10 +213,24 @@ void add_map_build(CLI::App& map, std::function<int()>& run) {
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_flag("--level", request->level, "turn the map so that up, as floors and walls say, is z");
+  command->add_option("--plan", *plan, "folder to write: the cloud in tiles, each of them a job by itself");
+  command
+      ->add_option("--tile", request->tile, "build only this tile of a folder that --plan wrote, from 0 on")
+      ->check(CLI::Range(0, 100'000'000));
   command->add_option("--threads", request->threads, "that work; the map is the same for any number")
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
-  command->callback([=, &run] { run = [=] { return build(*request); }; });
+  command->callback([=, &run] { run = [=] { return build_or_plan(*command, *request, *plan); }; });
+}
+
+void add_map_merge(CLI::App& map, std::function<int()>& run) {
+  auto request = std::make_shared<BuildRequest>();
+  request->output = "map.h5";
+  auto* command = map.add_subcommand("merge", "Make one map of tiles that have been built");
+  command->add_option("tiles", request->input, "folder that `map build --plan` wrote")->required();
+  command->add_option("-o,--output", request->output, "map file")->capture_default_str();
+  command->add_flag("--level", request->level, "turn the map so that up, as floors and walls say, is z");
+  command->callback([=, &run] { run = [=] { return merge_tiles(*request); }; });
 }
 
 void add_map_compare(CLI::App& map, std::function<int()>& run) {

@@ -2,6 +2,7 @@
 #include "serve_live.h"
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <limits>
@@ -10,6 +11,7 @@
 #include <thread>
 
 #include "commands.h"
+#include "evpose/core/log.h"
 #include "evpose/io/calibration/calibration.h"
 #include "evpose/io/calibration/kalibr.h"
 #include "evpose/io/files/config_yaml.h"
@@ -26,6 +28,7 @@ constexpr TimeNs kIdle = 5 * kNsPerMs;     // the longest wait for data before t
 constexpr double kAgainPosition_m = 0.03;  // of a pose that is some time old
 constexpr double kAgainRotation_rad = 0.02;
 constexpr double kAgainSpeed_m_s = 0.5;
+constexpr double kLateShare = 0.01;  // of the poses, from which on it is said
 
 volatile std::sig_atomic_t g_reset = 0;
 void ask_reset(int) { g_reset = 1; }
@@ -166,7 +169,11 @@ void print_outcome(const Session& session, const StreamQueue& queue, const Outpu
   if (outputs.delays().count() > 0)
     std::printf("delay from an update's instant to the outputs: p50 %.2f ms, p99 %.2f ms, largest %.2f ms\n",
                 outputs.delays().quantile_ms(0.5), outputs.delays().quantile_ms(0.99),
-                outputs.delays().quantile_ms(1));
+                outputs.delays().largest_ms());
+  if (outputs.delays().late_share() > kLateShare)
+    log_warning(text("not real time: ", std::round(100 * outputs.delays().late_share()),
+                     " % of the poses came more than ", to_seconds(Delays::kLate),
+                     " s late; lower rate_hz or events.most_mev_s, or take a faster machine"));
   if (const auto* link = outputs.link())
     std::printf("MAVLink: %llu frames sent, %llu lost\n",
                 static_cast<unsigned long long>(link->counts().sent),
@@ -246,6 +253,9 @@ Expected<int> serve(const ServeRequest& request) {
   if (!job) return job.error();
   auto source = open_source(address, *job, config->replay);
   if (!source) return source.error();
+  if (const double speed = config->replay.speed; !live && speed != 1)
+    log_warning(speed > 0 ? text("not real time: the recording is replayed at ", speed, " times its speed")
+                          : std::string("not real time: the recording is replayed as fast as it is tracked"));
   auto maker = TrackerMaker::create(*job, request.view >= 0);
   if (!maker) return maker.error();
   const auto placement = read_map_placement(job->map->source);
@@ -269,11 +279,14 @@ Expected<int> serve(const ServeRequest& request) {
   std::signal(SIGHUP, SIG_DFL);
   const bool interrupted = InterruptGuard::interrupted();
   print_outcome(session, queue, outputs);
-  int status = outputs.health() == Health::lost ? 1 : 0;
+  const RunVerdict verdict = outputs.verdict();
+  int status = verdict.good() ? 0 : 1;
   if (outputs.run() != nullptr) {
     const auto outcome = finish(*outputs.run(), *job, request, *config, session, queue, begin);
     if (!outcome) return outcome.error();
     status = report_run(outcome);
+  } else if (session.counts().updates > 0) {
+    std::printf("%s\n", verdict_text(verdict, job->findings).c_str());
   }
   return interrupted ? kInterruptedStatus : status;
 }

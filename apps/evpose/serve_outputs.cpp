@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kMostReceived =
     16;  // blocks of bytes at a time: whatever floods us does not keep us from tracking
+constexpr std::size_t kMostChanges = 10'000;  // of health: a stream may last for days
 
 /// recording.yaml knows best, then the map file, then the configuration.
 VehicleFrames vehicle_frames(const FramesConfig& c, const Recording& recording,
@@ -34,6 +35,8 @@ void Delays::add(TimeNs delay) {
   const TimeNs bin = std::clamp<TimeNs>(delay / kBin, 0, static_cast<TimeNs>(bins_.size()) - 1);
   ++bins_[static_cast<std::size_t>(bin)];
   ++count_;
+  late_ += delay > kLate ? 1 : 0;
+  largest_ = std::max(largest_, delay);
 }
 
 double Delays::quantile_ms(double share) const {
@@ -41,7 +44,7 @@ double Delays::quantile_ms(double share) const {
   std::uint64_t seen = 0;
   std::size_t bin = 0;
   while (bin + 1 < bins_.size() && (seen += bins_[bin]) <= wanted) ++bin;
-  return 1e3 * to_seconds(static_cast<TimeNs>(bin) * kBin);
+  return bin + 1 == bins_.size() ? largest_ms() : 1e3 * to_seconds(static_cast<TimeNs>(bin) * kBin);
 }
 
 Outputs::Outputs(const ServeConfig& config, const TrackJob& job, const MapPlacement& placement)
@@ -74,6 +77,13 @@ void Outputs::add(const Update& u, TimeNs data_to_monotonic, const Tracker& trac
   const TimeNs delay = monotonic_ns() - (u.t + data_to_monotonic);
   delays_.add(delay);
   if (viewer_) viewer_->add(u, tracker, 1e3 * to_seconds(delay));
+  if (delays_.count() == 1) first_t_ = u.t;
+  last_t_ = u.t;
+  judged_ += counts_in_share(u.health, to_seconds(u.t - first_t_)) ? 1 : 0;
+  if (changes_.empty() || u.health != health_ || !u.reason.empty()) {
+    changes_.push_back({u.t, u.health, u.reason});
+    if (changes_.size() > kMostChanges) changes_.pop_front();
+  }
   health_ = u.health;
   ++updates_[static_cast<std::size_t>(u.health)];
   if (!u.reason.empty()) log_detail(text(to_string(u.health), ": ", u.reason));
@@ -106,6 +116,13 @@ void Outputs::service(TimeNs now_ns) {
   }
   reporter_->tick(now_ns);
   if (const std::string words = link_->take_notice(); !words.empty()) notice(words);
+}
+
+RunVerdict Outputs::verdict() const {
+  const std::vector<HealthChange> changes(changes_.begin(), changes_.end());
+  const auto tracking = updates_[static_cast<std::size_t>(Health::tracking)];
+  return {judged_ == 0 ? 0 : static_cast<double>(tracking) / static_cast<double>(judged_),
+          to_seconds(last_t_ - first_t_), problems_of(changes, last_t_)};
 }
 
 std::string Outputs::healths() const {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <string>
@@ -9,6 +11,7 @@
 
 #include "evpose/io/maps/map_h5.h"
 #include "evpose/mavlink/link.h"
+#include "evpose/report/run_verdict.h"
 #include "evpose/view/viewer.h"
 #include "serve_live.h"
 
@@ -19,12 +22,20 @@ class Delays {
  public:
   void add(TimeNs delay);
   std::uint64_t count() const { return count_; }
+  /// To 0.01 ms up to a second; beyond, the largest.
   double quantile_ms(double share) const;
+  double largest_ms() const { return 1e3 * to_seconds(largest_); }
+  /// Of updates whose pose came later than kLate after its instant.
+  double late_share() const {
+    return static_cast<double>(late_) / static_cast<double>(std::max<std::uint64_t>(count_, 1));
+  }
+  static constexpr TimeNs kLate = 100 * kNsPerMs;  ///< an autopilot's filter no longer takes it
 
  private:
   static constexpr TimeNs kBin = 10 * kNsPerUs;
   std::vector<std::uint64_t> bins_ = std::vector<std::uint64_t>(100'000);
-  std::uint64_t count_ = 0;
+  std::uint64_t count_ = 0, late_ = 0;
+  TimeNs largest_ = 0;
 };
 
 /// Everything that hears of the poses: MAVLink, the viewer, the run folder.
@@ -43,6 +54,8 @@ class Outputs {
   Health health() const { return health_; }
   /// How the updates were judged: "tracking 98.5 %, initialising 1.5 %"; empty without updates.
   std::string healths() const;
+  /// How tracking went as a whole, from the last changes of health.
+  RunVerdict verdict() const;
   const Delays& delays() const { return delays_; }
   const mavlink::Link* link() const { return link_.get(); }
   RunFolder* run() { return run_.get(); }
@@ -56,6 +69,9 @@ class Outputs {
   TimeNs recorded_until_ = std::numeric_limits<TimeNs>::min();
   Health health_ = Health::waiting;
   std::array<std::uint64_t, 5> updates_{};  ///< by health
+  std::deque<HealthChange> changes_;        ///< the last ones
+  std::uint64_t judged_ = 0;                ///< updates that count in the share that was tracked
+  TimeNs first_t_ = 0, last_t_ = 0;         ///< of updates
   Delays delays_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "evpose/core/error.h"
 #include "evpose/io/maps/map_h5.h"
+#include "evpose/io/maps/map_pages.h"
 #include "fuzz.h"
 
 namespace {
@@ -37,4 +38,8 @@ EVPOSE_FUZZ_TARGET(hdf5_map) {
   for (const auto& triangle : map->occluders.triangles)
     for (const auto vertex : triangle)
       EVPOSE_CHECK(static_cast<std::size_t>(vertex) < map->occluders.vertices.size());
+  const auto pages = evpose::MapPages::open(path);
+  if (!pages) return;
+  const auto part = pages->around(Eigen::Vector3d::Zero(), 1e6);
+  EVPOSE_CHECK(!part || (*part)->points.size() == (*part)->numbers.size());
 }

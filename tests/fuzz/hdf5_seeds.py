@@ -44,7 +44,7 @@ def mvsec(file):
     file["davis/left/imu_ts"] = np.array([1.5e9, 1.5e9 + 0.01])
 
 
-def contour_map(file):
+def contour_map(file, pages=False):
     meta = file.create_group("meta")
     meta.attrs["format"], meta.attrs["units"] = np.bytes_(b"evpose-map"), np.bytes_(b"m")
     meta.attrs["version_major"], meta.attrs["crc"] = np.uint32(1), np.uint32(0)
@@ -63,6 +63,11 @@ def contour_map(file):
         "polygons/plane": np.array([0], "i4"), "polygons/hole_of": np.array([-1], "i4"),
         "polygons/double_sided": np.array([0], "u1"),
     }
+    if pages:  # the first has a contour and no surface
+        ends = {"points": [2, 4], "contours": [1, 2], "planes": [0, 1], "polygons": [0, 1], "vertices": [0, 4]}
+        datasets |= {f"pages/{name}_end": np.array(rows, "u8") for name, rows in ends.items()}
+        datasets |= {"pages/box": np.array([[0, 0, 1, 1]] * 2, "f4"), "pages/crc32": np.zeros(2, "u4"),
+                     "contours/plane_a": np.array([-1, 0], "i4")}
     for name, values in datasets.items():
         file[name] = values
         file[name].attrs["crc32"] = np.uint32(zlib.crc32(values.tobytes()))
@@ -70,5 +75,5 @@ def contour_map(file):
 
 SEEDS = {} if h5py is None else {
     "hdf5_events": [lambda: written(columns), lambda: written(metavision), lambda: written(mvsec)],
-    "hdf5_map": [lambda: written(contour_map)],
+    "hdf5_map": [lambda: written(contour_map), lambda: written(lambda file: contour_map(file, True))],
 }

@@ -34,12 +34,16 @@ class ServeTest(ServingTest):
         link = ["--mavlink", f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"]
         fast = self.run_to_end("serve", self.folder, *self.into("fast"), "--speed", "0", *link)
         self.assertEqual(fast.returncode, 0, fast.stderr)
+        self.assertIn("not real time: the recording is replayed as fast as it is tracked", fast.stderr)
         self.same_files("tracked", "fast")
         # At the clock's pace; a machine that is too busy may take longer, but leaves nothing out.
         paced = self.run_to_end("serve", self.folder, *self.into("paced"), "--set", "queue.shed=false", *link)
         self.assertEqual(paced.returncode, 0, paced.stderr)
         self.same_files("tracked", "paced")
         self.assertIn("p99", paced.stdout)
+        self.assertNotIn("replayed", paced.stderr)
+        unsaved = self.run_to_end("serve", self.folder, "--speed", "0")
+        self.assertRegex(unsaved.stdout, r"tracking in \d+\.\d % of the updates")
 
     def test_interrupted_it_leaves_complete_files(self):
         process = self.start("serve", self.folder, *self.into("interrupted"), "--set", "replay.loop=true")

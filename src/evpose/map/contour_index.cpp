@@ -57,7 +57,7 @@ Sphere bound(std::uint32_t begin, std::uint32_t end, const Position& position) {
 }  // namespace
 
 ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
-    : map_(map), cube_m_(static_cast<float>(cube_m)) {
+    : map_(&map), cube_m_(static_cast<float>(cube_m)) {
   const std::size_t n = map.points.size();
   struct Keys {
     std::int64_t block, cube;
@@ -75,7 +75,7 @@ ContourIndex::ContourIndex(const ContourMap& map, double cube_m)
     return a < b;
   });
   const auto position = [&](std::uint32_t i) -> const Eigen::Vector3f& {
-    return map_.points[order_[i]].position;
+    return map_->points[order_[i]].position;
   };
   const auto count = static_cast<std::uint32_t>(order_.size());
   for (std::uint32_t begin = 0; begin < count;) {
@@ -105,9 +105,9 @@ void ContourIndex::order_coarse_to_fine(Cube& cube) {
   std::unordered_set<std::uint64_t> taken;
   for (std::uint32_t& end : cube.level_end) {
     taken.clear();
-    for (auto i = at(cube.begin); i != at(done); ++i) taken.insert(stretch_of(map_.points[*i], spacing));
+    for (auto i = at(cube.begin); i != at(done); ++i) taken.insert(stretch_of(map_->points[*i], spacing));
     const auto rest = std::stable_partition(at(done), at(cube.end), [&](std::uint32_t number) {
-      return taken.insert(stretch_of(map_.points[number], spacing)).second;
+      return taken.insert(stretch_of(map_->points[number], spacing)).second;
     });
     end = done = static_cast<std::uint32_t>(rest - order_.begin());
     spacing *= 0.5F;
@@ -124,7 +124,7 @@ std::uint32_t ContourIndex::Cube::end_for(float spacing_m) const {
 }
 
 void ContourIndex::group_occluders() {
-  const TriangleMesh& mesh = map_.occluders;
+  const TriangleMesh& mesh = map_->occluders;
   const auto n = static_cast<std::uint32_t>(mesh.triangles.size());
   const auto corner = [&mesh](std::uint32_t triangle, std::size_t k) -> const Eigen::Vector3f& {
     return mesh.vertices[mesh.triangles[triangle][k]];
@@ -150,7 +150,7 @@ void ContourIndex::group_occluders() {
 
 void ContourIndex::append_cubes_within(const Eigen::Vector3d& centre_map, double radius_m,
                                        std::vector<std::uint32_t>& out) const {
-  const Eigen::Vector3f centre = (centre_map - map_.anchor).cast<float>();
+  const Eigen::Vector3f centre = (centre_map - map_->anchor).cast<float>();
   const auto radius = static_cast<float>(radius_m);
   // Only the blocks whose keys lie around the sphere are looked up; few enough of them to ask for each.
   const float edge = cube_m_ * kBlockCubes;

@@ -13,7 +13,8 @@ namespace evpose {
 /// grow with the map.
 class ContourIndex {
  public:
-  /// Keeps a reference to `map`, whose view-dependent contours are left out. `cube_m`: edge of a cube.
+  /// Keeps `map`, which must outlive it, and whose view-dependent contours are left out. `cube_m`: edge of a
+  /// cube.
   explicit ContourIndex(const ContourMap& map, double cube_m = 0.5);
 
   /// Inside a cube the points come from coarse to fine: first some that lie 16 cm apart along the contours,
@@ -33,7 +34,7 @@ class ContourIndex {
   const std::vector<Cube>& cubes() const { return cubes_; }
   /// Point numbers of the map, cube after cube.
   const std::vector<std::uint32_t>& order() const { return order_; }
-  const ContourMap& map() const { return map_; }
+  const ContourMap& map() const { return *map_; }
 
   /// Some occluding triangles that lie together.
   struct Occluders {
@@ -59,7 +60,7 @@ class ContourIndex {
   void order_coarse_to_fine(Cube& cube);
   void group_occluders();
 
-  const ContourMap& map_;
+  const ContourMap* map_;
   float cube_m_;
   std::vector<Cube> cubes_;
   std::vector<BlockRange> blocks_;

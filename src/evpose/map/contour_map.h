@@ -71,18 +71,28 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< both sides hide
 };
 
+/// Where a part of the map by place ends; it begins where the one before ends. Contours, planes and polygons
+/// lie in one page each, with all that they name.
+struct MapPage {
+  std::uint32_t points_end = 0, planes_end = 0, polygons_end = 0;
+};
+
 /// The prior map: contours in the map frame. Coordinates are floats relative to an anchor, so that their
 /// rounding stays below 0.1 mm within 1 km of it.
 struct ContourMap {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< map frame, metres
   std::vector<ContourPoint> points;
   std::vector<MapPlane> planes;
-  std::vector<MapPolygon> polygons;  ///< of the planes; they hide what is behind (triangulated())
-  TriangleMesh occluders;            ///< empty: nothing is hidden
-  std::string frame = "map";         ///< name of the map frame
-  std::string source;                ///< file it was read from, for messages
+  std::vector<MapPolygon> polygons;    ///< of the planes; they hide what is behind (triangulated())
+  TriangleMesh occluders;              ///< empty: nothing is hidden
+  std::vector<MapPage> pages;          ///< empty: the map is not divided
+  std::vector<std::uint32_t> numbers;  ///< of the points in the map that this is a part of, ascending; empty:
+                                       ///< it is a whole
+  std::string frame = "map";           ///< name of the map frame
+  std::string source;                  ///< file it was read from, for messages
 
   Eigen::Vector3d position(std::size_t i) const { return anchor + points[i].position.cast<double>(); }
+  std::uint32_t number(std::uint32_t i) const { return numbers.empty() ? i : numbers[i]; }
 };
 
 }  // namespace evpose

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "evpose/core/config.h"
+#include "evpose/core/error.h"
 
 namespace evpose {
 namespace {
@@ -79,6 +80,13 @@ VisibleSet::VisibleSet(const ContourIndex& index, const Camera& camera, const Vi
   columns_ = static_cast<int>((size.width + 2 * config_.margin_px) / config.stride_px) + 4;
   rows_ = static_cast<int>((size.height + 2 * config_.margin_px) / config.stride_px) + 4;
   cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+}
+
+void VisibleSet::renumber(std::span<const std::uint32_t> number_now) {
+  EVPOSE_CHECK(!choosing());
+  if (job_.valid()) job_.get();
+  for (std::uint32_t& point : points_) point = number_now[point];
+  std::erase(points_, kGone);
 }
 
 double VisibleSet::moved_px(const Pose& from, const Pose& to) const {
@@ -259,7 +267,10 @@ void VisibleSet::keep_to_budget() {
   if (next_points_.size() > static_cast<std::size_t>(config_.budget)) {
     const auto middle = next_points_.begin() + config_.budget;
     std::nth_element(next_points_.begin(), middle, next_points_.end(),
-                     [](std::uint32_t a, std::uint32_t b) { return priority_of(a) < priority_of(b); });
+                     [this](std::uint32_t a, std::uint32_t b) {
+                       const ContourMap& map = index_.map();
+                       return priority_of(map.number(a)) < priority_of(map.number(b));
+                     });
     next_points_.erase(middle, next_points_.end());
     std::sort(next_points_.begin(), next_points_.end());
   }

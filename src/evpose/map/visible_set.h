@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <future>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "evpose/camera/camera.h"
@@ -47,6 +48,12 @@ class VisibleSet {
 
   /// As of the last call of choose().
   const std::vector<std::uint32_t>& chosen() const { return points_; }
+  /// A choice is under way, which knows the index as it is.
+  bool choosing() const { return calls_left_ > 0; }
+  /// The index is that of another part of the map from now on: each chosen point has got this number, kGone
+  /// if it is not in it. Not while choosing.
+  static constexpr std::uint32_t kGone = ~0U;
+  void renumber(std::span<const std::uint32_t> number_now);
 
  private:
   double moved_px(const Pose& from, const Pose& to) const;

@@ -12,6 +12,7 @@
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
 #include "evpose/core/parallel.h"
+#include "evpose/core/thinned.h"
 #include "evpose/map/triangulation.h"
 #include "evpose/map_build/contrast.h"
 #include "evpose/map_build/curved_planes.h"
@@ -149,7 +150,7 @@ namespace {
 
 /// What a tile is made of, and the tools to work on it.
 struct TileTask {
-  const Tile& tile;
+  const CloudTile& tile;
   const BuildConfig& config;
   ThreadPool& pool;
   std::span<const View> views;
@@ -203,16 +204,11 @@ bool find_contours(const TileTask& task, const Neighbours& tree, TileContents& f
   return true;
 }
 
-/// Adds to a map what lies in a tile's core.
+/// Adds to an empty map what lies in a tile's core.
 class TileWriter {
  public:
   TileWriter(const TileTask& task, const Neighbours& tree, TileContents& found, BuiltMap& out)
-      : task_(task),
-        tree_(tree),
-        found_(found),
-        map_(out.map),
-        figures_(out.figures),
-        first_plane_(static_cast<std::int32_t>(out.map.planes.size())) {}
+      : task_(task), tree_(tree), found_(found), map_(out.map), figures_(out.figures) {}
 
   void add_all();
 
@@ -225,15 +221,12 @@ class TileWriter {
   TileContents& found_;
   ContourMap& map_;
   BuildFigures& figures_;
-  std::int32_t first_plane_;
   std::int32_t chain_ = -1;  ///< of the last segment
 };
 
 void TileWriter::add(const LineSegment& whole) {
   std::optional<LineSegment> segment = clipped(whole, task_.tile);
   if (!segment) return;
-  if (segment->plane_a >= 0) segment->plane_a += first_plane_;
-  if (segment->plane_b >= 0) segment->plane_b += first_plane_;
   const bool same_curve = segment->chain >= 0 && segment->chain == chain_ && !map_.points.empty() &&
                           map_.points.back().plane_a == segment->plane_a;
   chain_ = segment->chain;
@@ -256,7 +249,7 @@ void TileWriter::add_plane(std::size_t p) {
   for (const std::uint32_t i : plane.points)
     figures_.in_planes += task_.tile.holds(found_.surface.position[i]) ? 1 : 0;
   figures_.curved += found_.curved[p] ? 1 : 0;
-  add_polygons(plane, first_plane_ + static_cast<std::int32_t>(p), found_.outlines[p], found_.edges_of[p],
+  add_polygons(plane, static_cast<std::int32_t>(p), found_.outlines[p], found_.edges_of[p],
                found_.surface.scale.noise_m, map_);
   map_.planes.push_back({plane.normal.cast<float>(), plane.d, static_cast<std::uint32_t>(plane.points.size()),
                          static_cast<float>(plane.rms_m)});
@@ -273,7 +266,7 @@ void TileWriter::add_all() {
   figures_.scale = found_.surface.scale;
 }
 
-/// Finds what one tile holds and adds to the map what lies in its core.
+/// Finds what one tile holds; into an empty map what lies in its core.
 Status build_tile(PointCloud cloud, const TileTask& task, BuiltMap& out) {
   const BuildConfig& config = task.config;
   BuildFigures& figures = out.figures;
@@ -303,6 +296,28 @@ Status build_tile(PointCloud cloud, const TileTask& task, BuiltMap& out) {
 
 }  // namespace
 
+Expected<BuiltMap> build_tile(PointCloud cloud, const CloudTile& tile, const BuildConfig& config,
+                              ThreadPool& pool, const std::function<bool(double)>& progress) {
+  BuiltMap out;
+  out.map.anchor = cloud.anchor;
+  out.map.source = cloud.source;
+  out.figures.points = cloud.points.size();
+  out.figures.tiles = 1;
+  if (const Status done = build_tile(std::move(cloud), {tile, config, pool, {}, progress}, out); !done)
+    return done.error();
+  out.figures.planes = out.map.planes.size();
+  return out;
+}
+
+Status complete_map(ContourMap& map) {
+  if (std::all_of(map.points.begin(), map.points.end(),
+                  [](const auto& p) { return is_view_dependent(p.kind); }))
+    return Error{map.source, text("no contour among ", map.planes.size(), " planes"),
+                 "give a larger or denser cloud"};
+  map.occluders = triangulated(map.planes, map.polygons);
+  return {};
+}
+
 Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, ThreadPool& pool,
                              const std::function<bool(double)>& progress) {
   BuiltMap out;
@@ -312,7 +327,10 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
   out.figures.points = cloud.points.size();
   std::vector<View> views;
   for (const Eigen::Vector3d& eye : cloud.viewpoints) views.emplace_back(eye - cloud.anchor, cloud.points);
-  const std::vector<Tile> tiles = cut_into_tiles(cloud.points, config.tile_points, config.tile_overlap_m);
+  Thinned<Eigen::Vector3f> sample(kTileSample);
+  for (const auto& p : cloud.points) sample.add(p);
+  const std::vector<CloudTile> tiles =
+      cut_into_tiles(sample.kept(), cloud.points.size(), config.tile_points, config.tile_overlap_m);
   out.figures.tiles = tiles.size();
   std::optional<Error> barren;  // what a tile without planes said
   for (std::size_t k = 0; k < tiles.size(); ++k) {
@@ -327,19 +345,17 @@ Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, Thread
     else
       part = points_seen_by(cloud, tiles[k]);
     if (!share_done(0)) return kGivenUp;
-    const TileTask task{tiles[k], config, pool, views, share_done};
-    if (const Status done = build_tile(std::move(part), task, out); !done) {
-      if (given_up) return kGivenUp;
-      barren = done.error();
-    }
+    BuiltMap tile;
+    std::swap(tile.figures, out.figures);
+    const Status done = build_tile(std::move(part), {tiles[k], config, pool, views, share_done}, tile);
+    std::swap(tile.figures, out.figures);
+    if (given_up) return kGivenUp;
+    if (!done) barren = done.error();
+    if (done) append_tile(tile.map, map);
   }
   out.figures.planes = map.planes.size();
   if (map.planes.empty() && barren) return *barren;
-  if (std::all_of(map.points.begin(), map.points.end(),
-                  [](const auto& p) { return is_view_dependent(p.kind); }))
-    return Error{map.source, text("no contour among ", out.figures.planes, " planes"),
-                 "give a larger or denser cloud"};
-  map.occluders = triangulated(map.planes, map.polygons);
+  if (const Status done = complete_map(map); !done) return done.error();
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "evpose/core/error.h"
+#include "evpose/map/cloud_tile.h"
 #include "evpose/map/contour_map.h"
 #include "evpose/map/point_cloud.h"
 #include "evpose/map_build/boundaries.h"
@@ -56,5 +57,13 @@ struct BuiltMap {
 /// no plane or no contour is found.
 Expected<BuiltMap> build_map(PointCloud cloud, const BuildConfig& config, ThreadPool& pool,
                              const std::function<bool(double)>& progress);
+
+/// Of one tile of a larger cloud, by itself: what build_map() would append for it. `cloud` has the points
+/// that the tile sees, and no viewpoints. Errors: interrupted; nothing flat.
+Expected<BuiltMap> build_tile(PointCloud cloud, const CloudTile& tile, const BuildConfig& config,
+                              ThreadPool& pool, const std::function<bool(double)>& progress);
+
+/// What is left to do for a map when all of its tiles are appended: what hides. Error: it has no contour.
+Status complete_map(ContourMap& map);
 
 }  // namespace evpose::map_build

@@ -3,18 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "evpose/map/contour_map.h"
 #include "evpose/map/point_cloud.h"
 
 namespace evpose::map_build {
 namespace {
 
-constexpr std::size_t kSample = 200'000;  // points that tell where to cut
 constexpr double kLeastSide_m = 5;  // narrower tiles are not halved: their overlaps would be most of them
 
 void halve(std::vector<Eigen::Vector2f>& sample, std::size_t begin, std::size_t end, double most,
-           const Tile& tile, std::vector<Tile>& out) {
+           const CloudTile& tile, std::vector<CloudTile>& out) {
   const auto count = end - begin;
   Eigen::Vector2f low = count > 0 ? sample[begin] : Eigen::Vector2f::Zero(), high = low;
   for (std::size_t i = begin; i < end; ++i) low = low.cwiseMin(sample[i]), high = high.cwiseMax(sample[i]);
@@ -35,7 +34,7 @@ void halve(std::vector<Eigen::Vector2f>& sample, std::size_t begin, std::size_t 
                                      sample.begin() + static_cast<std::ptrdiff_t>(end),
                                      [axis, at](const Eigen::Vector2f& p) { return p[axis] < at; });
   const auto split = static_cast<std::size_t>(beyond - sample.begin());
-  Tile first = tile, second = tile;
+  CloudTile first = tile, second = tile;
   first.high[axis] = second.low[axis] = at;
   halve(sample, begin, split, most, first, out);
   halve(sample, split, end, most, second, out);
@@ -92,20 +91,21 @@ std::size_t sort_and_deduplicate(PointCloud& cloud) {
   return dropped;
 }
 
-std::vector<Tile> cut_into_tiles(const std::vector<Eigen::Vector3f>& points, double most_points,
-                                 double overlap_m) {
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  const Tile all{Eigen::Vector2f(-kFar, -kFar), Eigen::Vector2f(kFar, kFar), static_cast<float>(overlap_m)};
-  if (static_cast<double>(points.size()) <= most_points) return {all};
-  const std::size_t step = std::max<std::size_t>(1, points.size() / kSample);
-  std::vector<Eigen::Vector2f> sample;
-  for (std::size_t i = 0; i < points.size(); i += step) sample.push_back(points[i].head<2>());
-  std::vector<Tile> out;
-  halve(sample, 0, sample.size(), most_points / static_cast<double>(step), all, out);
+std::vector<CloudTile> cut_into_tiles(const std::vector<Eigen::Vector3f>& sample, std::size_t points,
+                                      double most_points, double overlap_m) {
+  constexpr float kFar = CloudTile::kNoBorder_m;
+  const CloudTile all{Eigen::Vector2f(-kFar, -kFar), Eigen::Vector2f(kFar, kFar),
+                      static_cast<float>(overlap_m)};
+  if (static_cast<double>(points) <= most_points) return {all};
+  std::vector<Eigen::Vector2f> places;
+  for (const auto& p : sample) places.push_back(p.head<2>());
+  const double share = static_cast<double>(sample.size()) / static_cast<double>(points);
+  std::vector<CloudTile> out;
+  halve(places, 0, places.size(), share * most_points, all, out);
   return out;
 }
 
-PointCloud points_seen_by(const PointCloud& cloud, const Tile& tile) {
+PointCloud points_seen_by(const PointCloud& cloud, const CloudTile& tile) {
   PointCloud out;
   out.anchor = cloud.anchor;
   out.source = cloud.source;
@@ -117,7 +117,7 @@ PointCloud points_seen_by(const PointCloud& cloud, const Tile& tile) {
   return out;
 }
 
-std::optional<LineSegment> clipped(const LineSegment& segment, const Tile& tile) {
+std::optional<LineSegment> clipped(const LineSegment& segment, const CloudTile& tile) {
   double first = 0, last = 1;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const double from = segment.begin[axis], way = segment.end[axis] - from;
@@ -135,6 +135,30 @@ std::optional<LineSegment> clipped(const LineSegment& segment, const Tile& tile)
   out.begin = segment.begin + first * (segment.end - segment.begin);
   out.end = segment.begin + last * (segment.end - segment.begin);
   return out;
+}
+
+void append_tile(const ContourMap& tile, ContourMap& whole) {
+  const auto planes = static_cast<std::int32_t>(whole.planes.size());
+  const auto polygons = static_cast<std::int32_t>(whole.polygons.size());
+  const auto last = std::find_if(whole.points.rbegin(), whole.points.rend(),
+                                 [](const ContourPoint& p) { return p.contour >= 0; });
+  const std::int32_t contours = last == whole.points.rend() ? 0 : last->contour + 1;
+  const auto moved = [](std::int32_t number, std::int32_t by) { return number < 0 ? number : number + by; };
+  for (ContourPoint p : tile.points) {
+    p.contour = moved(p.contour, contours);
+    p.plane_a = moved(p.plane_a, planes);
+    p.plane_b = moved(p.plane_b, planes);
+    whole.points.push_back(p);
+  }
+  whole.planes.insert(whole.planes.end(), tile.planes.begin(), tile.planes.end());
+  for (MapPolygon polygon : tile.polygons) {
+    polygon.plane = moved(polygon.plane, planes);
+    polygon.hole_of = moved(polygon.hole_of, polygons);
+    whole.polygons.push_back(std::move(polygon));
+  }
+  whole.pages.push_back({static_cast<std::uint32_t>(whole.points.size()),
+                         static_cast<std::uint32_t>(whole.planes.size()),
+                         static_cast<std::uint32_t>(whole.polygons.size())});
 }
 
 }  // namespace evpose::map_build

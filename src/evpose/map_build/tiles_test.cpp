@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
 #include "evpose/map_build/test_scan.h"
@@ -17,7 +16,7 @@ TEST(Tiles, EachPointIsHeldByOneAndNoTileIsTooLarge) {
   std::uniform_real_distribution<float> across(0, 60), along(0, 25);
   std::vector<Eigen::Vector3f> points(20000);
   for (auto& p : points) p = {across(random), along(random), 0};
-  const auto tiles = cut_into_tiles(points, 6000, 1);
+  const auto tiles = cut_into_tiles(points, points.size(), 6000, 1);
   EXPECT_EQ(tiles.size(), 4U);
   std::vector<std::size_t> held(tiles.size(), 0);
   for (const auto& p : points) {
@@ -30,7 +29,7 @@ TEST(Tiles, EachPointIsHeldByOneAndNoTileIsTooLarge) {
 }
 
 TEST(Tiles, AClippedSegmentLiesInItsCore) {
-  constexpr float kFar = std::numeric_limits<float>::infinity();
+  constexpr float kFar = CloudTile::kNoBorder_m;
   LineSegment segment;
   segment.begin = {0, 0, 0};
   segment.end = {4, 2, 1};
@@ -59,6 +58,50 @@ TEST(Tiles, ACreaseAcrossTilesIsWholeAndStraight) {
     length += static_cast<double>(p.length);
   }
   EXPECT_NEAR(length, 30, 0.3);
+}
+
+/// What one is compared by: everything that a map's file holds.
+void expect_same_map(const ContourMap& a, const ContourMap& b) {
+  ASSERT_EQ(a.points.size(), b.points.size());
+  ASSERT_EQ(a.polygons.size(), b.polygons.size());
+  ASSERT_EQ(a.planes.size(), b.planes.size());
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    EXPECT_EQ(a.points[i].position, b.points[i].position);
+    EXPECT_EQ(a.points[i].contour, b.points[i].contour);
+    EXPECT_EQ(a.points[i].plane_a, b.points[i].plane_a);
+    EXPECT_EQ(a.points[i].plane_b, b.points[i].plane_b);
+  }
+  for (std::size_t i = 0; i < a.polygons.size(); ++i) {
+    EXPECT_EQ(a.polygons[i].vertices, b.polygons[i].vertices);
+    EXPECT_EQ(a.polygons[i].plane, b.polygons[i].plane);
+    EXPECT_EQ(a.polygons[i].hole_of, b.polygons[i].hole_of);
+  }
+  for (std::size_t i = 0; i < a.planes.size(); ++i) EXPECT_EQ(a.planes[i].d, b.planes[i].d);
+}
+
+TEST(Tiles, BuiltByThemselvesTheyMakeTheMapOfOneRun) {
+  Scan scan(32);
+  scan.rectangle({0, 0, 0}, {20, 0, 0}, {0, 4, 0}, 1600).rectangle({0, 4, 0}, {20, 0, 0}, {0, 0, 3}, 1600);
+  const PointCloud cloud = scan.cloud();
+  BuildConfig config;
+  config.tile_points = 60'000;
+  ThreadPool pool(2);
+  const auto whole = build_map(cloud, config, pool, [](double) { return true; });
+  ASSERT_TRUE(whole) << whole.error().line();
+  const auto tiles =
+      cut_into_tiles(cloud.points, cloud.points.size(), config.tile_points, config.tile_overlap_m);
+  ASSERT_GT(tiles.size(), 2U);
+  ContourMap merged;
+  merged.anchor = cloud.anchor;
+  for (const CloudTile& tile : tiles) {
+    const auto part =
+        build_tile(points_seen_by(cloud, tile), tile, config, pool, [](double) { return true; });
+    ASSERT_TRUE(part) << part.error().line();
+    append_tile(part->map, merged);
+  }
+  ASSERT_TRUE(complete_map(merged));
+  expect_same_map(whole->map, merged);
+  EXPECT_EQ(whole->map.occluders.vertices, merged.occluders.vertices);
 }
 
 TEST(Tiles, OrderOfThePointsDoesNotMatterAndDuplicatesGo) {

@@ -97,8 +97,17 @@ void Reporter::say(std::uint8_t severity, const std::string& words) {
   Statustext message;
   message.severity = severity;
   const std::string line = "evpose: " + words;
-  std::copy_n(line.begin(), std::min(line.size(), message.text.size()), message.text.begin());
-  send(message);
+  const std::size_t most = message.text.size();
+  if (line.size() > most && ++text_id_ == 0) ++text_id_;
+  if (line.size() > most) message.id = text_id_;  // 0: the text is whole
+  // A chunk that is not full ends the text; it may be empty.
+  for (std::size_t at = 0; at == 0 || (message.id != 0 && at <= line.size());
+       at += most, ++message.chunk_seq) {
+    message.text.fill('\0');
+    std::copy_n(line.begin() + static_cast<std::ptrdiff_t>(at), std::min(line.size() - at, most),
+                message.text.begin());
+    send(message);
+  }
 }
 
 void Reporter::say(const Update& u) {

@@ -94,6 +94,7 @@ class Reporter {
   TimeNs data_to_monotonic_ = 0;
   TimeNs next_heartbeat_ = 0, next_timesync_ = 0, next_origin_ = 0, timesync_sent_ = 0;
   std::uint8_t sequence_ = 0, reset_counter_ = 0;
+  std::uint16_t text_id_ = 0;  ///< of the last text in chunks
   bool reset_pending_ = false, origin_confirmed_ = false;
   Health health_ = Health::waiting;
 };

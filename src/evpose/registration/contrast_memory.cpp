@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace evpose {
 namespace {
@@ -19,6 +20,15 @@ void ContrastMemory::seed(std::uint32_t segment, int sign) {
   if (sign == 0) return;
   segments_[segment].net += static_cast<float>(sign * kSeedSteps * kDoubt_px2);
   segments_[segment].seeded = true;
+}
+
+void ContrastMemory::rearrange(std::span<const std::uint32_t> before, std::span<const int> map_contrast) {
+  const std::vector<Segment> old = std::exchange(segments_, std::vector<Segment>(before.size()));
+  for (std::uint32_t i = 0; i < segments_.size(); ++i)
+    if (before[i] != kNew)
+      segments_[i] = old[before[i]];
+    else
+      seed(i, -map_contrast[i]);
 }
 
 void ContrastMemory::sweep(std::uint32_t segment, double area_px2) {

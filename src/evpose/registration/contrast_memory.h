@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "evpose/registration/edge_delay.h"
@@ -18,6 +19,10 @@ class ContrastMemory {
 
   /// What the map says of a step's sign, -1, 0 or +1 as steps(). It counts until events have told more.
   void seed(std::uint32_t segment, int sign);
+  /// The segments are those of another part of the map from now on: number i was `before[i]`, or is
+  /// new; `map_contrast[i]`: what the map says of it, as ContourPoint::contrast.
+  static constexpr std::uint32_t kNew = ~0U;
+  void rearrange(std::span<const std::uint32_t> before, std::span<const int> map_contrast);
   /// The segment has swept so much of the image.
   void sweep(std::uint32_t segment, double area_px2);
   /// On less off events near the segment, as it would be if its normal pointed along its motion.

@@ -59,6 +59,9 @@ class EventRegistration final : public Registration {
   /// Hands on what the map says of the contrast of a segment, -1, 0 or +1 as ContourPoint::contrast.
   void seed_contrast(std::uint32_t segment, int map_contrast) { contrast_.seed(segment, -map_contrast); }
   const ContrastMemory* contrast() const override { return &contrast_; }
+  void rearrange_segments(std::span<const std::uint32_t> before, std::span<const int> map_contrast) override {
+    contrast_.rearrange(before, map_contrast);
+  }
   /// How far behind this contour its events are expected, px along its motion.
   EdgeDelay edge_delay(const ContourSample& sample) const;
 

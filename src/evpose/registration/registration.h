@@ -104,6 +104,10 @@ class Registration {
   /// Of the last measurement: its information and vector, sample by sample; none if it is no sum over
   /// samples.
   virtual std::span<const SampleOffset> offsets() const { return {}; }
+  /// The contrast segments are those of another part of the map from now on; see ContrastMemory. What the map
+  /// says of the sign of each, of which the new ones learn.
+  virtual void rearrange_segments(std::span<const std::uint32_t> before,
+                                  std::span<const int> map_contrast) = 0;
   /// What has been learnt of the contours' contrast; null if nothing is.
   virtual const ContrastMemory* contrast() const { return nullptr; }
 };

@@ -93,6 +93,9 @@ class TemporalFieldRegistration final : public Registration {
   bool reads_surface() const override { return true; }
   /// What the map says of the contrast of a segment, -1, 0 or +1 as ContourPoint::contrast.
   void seed_contrast(std::uint32_t segment, int map_contrast) { contrast_.seed(segment, -map_contrast); }
+  void rearrange_segments(std::span<const std::uint32_t> before, std::span<const int> map_contrast) override {
+    contrast_.rearrange(before, map_contrast);
+  }
   const ContrastMemory* contrast() const override { return &contrast_; }
 
  private:

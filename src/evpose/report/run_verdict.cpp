@@ -56,7 +56,7 @@ constexpr std::array kExplanations{
 double seconds(TimeNs t) { return static_cast<double>(t) / 1e9; }
 
 bool counts(const StateLog& log, const StateRow& row) {
-  return row.health != Health::initialising || to_seconds(row.t - log.rows.front().t) >= kCollecting_s;
+  return counts_in_share(row.health, to_seconds(row.t - log.rows.front().t));
 }
 
 double tracking_share(const StateLog& log) {
@@ -89,6 +89,10 @@ std::string line(const char* format, auto... values) {
 
 }  // namespace
 
+bool counts_in_share(Health health, double since_first_s) {
+  return health != Health::initialising || since_first_s >= kCollecting_s;
+}
+
 Error explain_reason(const std::string& reason) {
   for (const Explanation& e : kExplanations)
     if (reason.find(e.words) != std::string::npos) return {reason, e.cause, e.remedy};
@@ -96,34 +100,37 @@ Error explain_reason(const std::string& reason) {
           "check start, map and calibration: `evpose check` the recording"};
 }
 
-RunVerdict judge_run(const StateLog& log) {
-  RunVerdict out;
-  if (log.rows.empty()) return out;
-  out.length_s = to_seconds(log.rows.back().t - log.rows.front().t);
-  out.tracking_share = tracking_share(log);
-  for (std::size_t i = 0; i < log.health.size(); ++i) {
-    const HealthChange& change = log.health[i];
+std::vector<RunProblem> problems_of(std::span<const HealthChange> changes, TimeNs end) {
+  std::vector<RunProblem> out;
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    const HealthChange& change = changes[i];
     if (change.health == Health::tracking) continue;
-    const TimeNs end = i + 1 < log.health.size() ? log.health[i + 1].t : log.rows.back().t;
-    const double lasted_s = to_seconds(end - change.t);
+    // A stream whose clock starts again goes back in time.
+    const double lasted_s =
+        std::max(0.0, to_seconds((i + 1 < changes.size() ? changes[i + 1].t : end) - change.t));
     if (change.health == Health::initialising && lasted_s < kCollecting_s) continue;
     const std::string reason =
         !change.reason.empty() ? shortened(change.reason) : "no pose that the events confirm";
     const Error why = explain_reason(reason);
-    auto known = std::find_if(out.problems.begin(), out.problems.end(),
-                              [&](const RunProblem& p) { return p.cause == why.what; });
-    if (known == out.problems.end())
-      known = out.problems.insert(out.problems.end(), {change.health, "", 0, 0, why.what, why.fix});
+    auto known =
+        std::find_if(out.begin(), out.end(), [&](const RunProblem& p) { return p.cause == why.what; });
+    if (known == out.end()) known = out.insert(out.end(), {change.health, "", 0, 0, why.what, why.fix});
     known->health = std::max(known->health, change.health);
     known->reason = reason;
     known->total_s += lasted_s;
     known->last = change.t;
   }
   const auto follows = [](const RunProblem& p) { return p.reason.find(kSearch) != std::string::npos; };
-  std::stable_sort(out.problems.begin(), out.problems.end(), [&](const RunProblem& a, const RunProblem& b) {
+  std::stable_sort(out.begin(), out.end(), [&](const RunProblem& a, const RunProblem& b) {
     return std::pair(follows(a), -a.total_s) < std::pair(follows(b), -b.total_s);
   });
   return out;
+}
+
+RunVerdict judge_run(const StateLog& log) {
+  if (log.rows.empty()) return {};
+  return {tracking_share(log), to_seconds(log.rows.back().t - log.rows.front().t),
+          problems_of(log.health, log.rows.back().t)};
 }
 
 std::string verdict_text(const RunVerdict& verdict, const std::vector<Error>& findings) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,13 @@ struct RunVerdict {
   bool good() const { return tracking_share >= kGoodTrackingShare; }
 };
 
+/// Whether an update counts in the share that was tracked: not while the first events are collected.
+bool counts_in_share(Health health, double since_first_s);
+
 RunVerdict judge_run(const StateLog& log);
+
+/// Of changes of health in order of time, the last of which lasted until `end`: all but tracking.
+std::vector<RunProblem> problems_of(std::span<const HealthChange> changes, TimeNs end);
 
 /// Likely cause and remedy of a reason as the tracker gives it.
 Error explain_reason(const std::string& reason);

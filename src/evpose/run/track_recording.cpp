@@ -18,6 +18,7 @@
 #include "evpose/io/motion/imu_units.h"
 #include "evpose/io/recording/recording.h"
 #include "evpose/report/overlay.h"
+#include "evpose/run/open_map.h"
 #include "evpose/run/packet_queue.h"
 #include "evpose/run/plausibility.h"
 #include "evpose/run/presets.h"
@@ -87,12 +88,18 @@ Status write_learnt_map(const std::string& path, const ContourMap& map, const Tr
 
 }  // namespace
 
+Expected<std::string> map_path(const TrackRequest& request, const Recording& recording) {
+  if (!request.map.empty()) return request.map;
+  const std::string& own = recording.map_path.empty() ? recording.contours_path : recording.map_path;
+  if (own.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
+  return own;
+}
+
 Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request,
                                                      const Recording& recording) {
-  std::string path = request.map;
-  if (path.empty()) path = recording.map_path.empty() ? recording.contours_path : recording.map_path;
-  if (path.empty()) return Error{recording.folder, "the recording holds no map", "give one with --map"};
-  auto map = read_contour_map(path);
+  const auto path = map_path(request, recording);
+  if (!path) return path.error();
+  auto map = read_contour_map(*path);
   if (!map) return map.error();
   if (!request.occluders.empty()) {
     auto mesh = read_ply_mesh(request.occluders, map->anchor);
@@ -137,10 +144,24 @@ Expected<RunConfig> load_config(const TrackRequest& request) {
   return config;
 }
 
+namespace {
+
+/// By place, if the file can be read so and nothing asks for all of the map.
+Expected<OpenedMap> open_map_of(const TrackRequest& request, const RunConfig& config,
+                                const Recording& recording, const Eigen::Vector3d& start_map) {
+  if (!request.occluders.empty() || !request.learnt_map.empty()) {
+    const auto map = load_map(request, recording);
+    if (!map) return map.error();
+    return OpenedMap{*map, {}};
+  }
+  const auto path = map_path(request, recording);
+  return path ? open_map(*path, start_map, config.tracker) : path.error();
+}
+
+}  // namespace
+
 Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,
                             std::vector<TimedPose> truth) {
-  auto map = load_map(request, recording);
-  if (!map) return map.error();
   auto camera = make_camera(recording.camera);
   if (!camera) return Error{recording.calibration_path, camera.error().what, camera.error().fix};
   TrackJob job;
@@ -148,19 +169,23 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
   const auto start = choose_start(request.init, recording, truth,
                                   {request.init_sigma[0], request.init_sigma[1]}, &job.config.tracker.fusion);
   if (!start) return start.error();
+  const auto map = open_map_of(request, job.config, recording, start->T_map_body.p);
+  if (!map) return map.error();
   job.recording = recording;
-  job.map = *map;
+  job.map = map->map;
   job.truth = std::move(truth);
   job.start = *start;
   job.setup = {*camera,
                recording.T_cam_body.inverse(),
                recording.has_imu ? MotionModel::imu : MotionModel::constant_velocity,
                recording.imu_noise,
-               *map,
+               map->map,
                recording.camera,
-               recording.calibration_sigma};
+               recording.calibration_sigma,
+               map->parts,
+               start->T_map_body.p};
   job.start_words = start_words(request.init, !job.truth.empty());
-  for (const auto& doubt : {doubt_map_size(**map), doubt_start_place(**map, start->T_map_body)})
+  for (const auto& doubt : {doubt_map_size(*map->map), doubt_start_place(*map->map, start->T_map_body)})
     if (doubt) job.findings.push_back(*doubt);
   return job;
 }
@@ -245,7 +270,8 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
                    absolute(request.occluders)};
   summary.title = recording.name;
   const auto name = [](const std::string& path) { return path.substr(path.find_last_of('/') + 1); };
-  summary.subtitle = text("map ", name(map.source), " (", map.points.size(), " points",
+  summary.subtitle = text("map ", name(map.source), " (", map.points.size(),
+                          map.numbers.empty() ? " points" : " points around the start",
                           map.occluders.triangles.empty() ? "" : ", with occluders",
                           "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
   summary.start = job.start_words;

@@ -46,14 +46,16 @@ Expected<RunConfig> load_config(const TrackRequest& request);
 struct TrackJob {
   RunConfig config;
   Recording recording;
-  std::shared_ptr<const ContourMap> map;
-  std::vector<TimedPose> truth;  ///< empty: not known
+  std::shared_ptr<const ContourMap> map;  ///< or the part around the start, if it is read by place
+  std::vector<TimedPose> truth;           ///< empty: not known
   StartState start;
   std::string start_words;  ///< where it came from
   TrackerSetup setup;
   std::vector<Error> findings;  ///< what looks wrong although it can be tracked
 };
-/// The map of the request, or the recording's own.
+/// Of the request's map, or the recording's own.
+Expected<std::string> map_path(const TrackRequest& request, const Recording& recording);
+/// All of that map.
 Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request, const Recording& recording);
 /// The job on a recording that is known, with the map of the request or the recording's own.
 Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,

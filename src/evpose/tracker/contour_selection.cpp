@@ -20,7 +20,11 @@ ContourSelection::ContourSelection(const ContourIndex& index, const ContourSegme
                                    const Camera& camera, const Camera& choosing_camera,
                                    const Pose& T_body_cam, const VisibleSetConfig& config, double map_sigma_m,
                                    bool own_thread)
-    : view_{index.map(), segments, camera, T_body_cam, map_sigma_m},
+    : index_(index),
+      segments_(segments),
+      camera_(camera),
+      T_body_cam_(T_body_cam),
+      map_sigma_m_(map_sigma_m),
       visible_(index, choosing_camera, config, own_thread) {}
 
 double ContourSelection::largest_shift_px(const Vector6d& pose_change) const {
@@ -31,7 +35,7 @@ double ContourSelection::largest_shift_px(const Vector6d& pose_change) const {
 
 void ContourSelection::project(const FusionState& state, double span_s) {
   const BodyMotion motion{state.nav.T_map_body, state.nav.velocity, state.angular_rate};
-  project_contours(view_, visible_.chosen(), motion, span_s, samples_);
+  project_contours(view(), visible_.chosen(), motion, span_s, samples_);
   const Eigen::Matrix3d velocity_covariance = state.covariance.block<3, 3>(error_state::kV, error_state::kV);
   const double rate_variance = state.covariance.block<3, 3>(error_state::kBg, error_state::kBg).trace() / 3;
   flows_px_s_.clear();

@@ -23,7 +23,7 @@ class ContourSelection {
   /// The first choice of points is the dearest: made before the data come.
   void prepare(const Pose& T_map_body) { choose(T_map_body); }
   /// Chooses the points that the camera should see at this pose and near it.
-  void choose(const Pose& T_map_body) { visible_.choose(T_map_body * view_.T_body_cam); }
+  void choose(const Pose& T_map_body) { visible_.choose(T_map_body * T_body_cam_); }
   /// Projects the chosen points at this state over the last `span_s`.
   void project(const FusionState& state, double span_s);
   /// By how much samples would move across their contours if the pose changed by this, px; the largest.
@@ -31,12 +31,19 @@ class ContourSelection {
 
   std::span<const ContourSample> samples() const { return samples_; }
   std::span<const std::uint32_t> points() const { return visible_.chosen(); }
-  const ContourView& view() const { return view_; }
+  ContourView view() const { return {index_.map(), segments_, camera_, T_body_cam_, map_sigma_m_}; }
+  /// See VisibleSet.
+  bool choosing() const { return visible_.choosing(); }
+  void renumber(std::span<const std::uint32_t> number_now) { visible_.renumber(number_now); }
   double typical_flow_px_s() const { return typical_flow_px_s_; }
   double typical_depth_m() const { return typical_depth_m_; }
 
  private:
-  ContourView view_;
+  const ContourIndex& index_;
+  const ContourSegments& segments_;
+  const Camera& camera_;
+  const Pose& T_body_cam_;
+  double map_sigma_m_;
   VisibleSet visible_;
   std::vector<ContourSample> samples_;
   std::vector<double> flows_px_s_, depths_m_;  ///< of the samples

@@ -52,6 +52,12 @@ class PoseSupervisor {
     verifier_.add(events, contours, span_s, elapsed_s);
   }
 
+  /// The map's parts are those of another place from now on; see PoseVerifier. Not while searching.
+  void rearrange(std::span<const std::uint32_t> segments_before) {
+    verifier_.rearrange(segments_before);
+    relocalizer_.forget_map();
+  }
+
   /// Why the registration is not used; empty if it is.
   std::string refusal(TimeNs t, const RegistrationResult& registration, double innovation) const;
 

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
+
+#include "evpose/registration/contrast_memory.h"
 
 namespace evpose {
 namespace {
@@ -41,6 +44,19 @@ PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides)
 void PoseVerifier::restart() {
   for (const std::uint32_t i : seen_) pieces_[i] = {};
   seen_.clear();
+}
+
+void PoseVerifier::rearrange(std::span<const std::uint32_t> before) {
+  std::vector<std::uint32_t> now(pieces_.size(), ContrastMemory::kNew);
+  std::vector<Piece> pieces(before.size());
+  for (std::uint32_t i = 0; i < before.size(); ++i) {
+    if (before[i] == ContrastMemory::kNew) continue;
+    pieces[i] = pieces_[before[i]];
+    now[before[i]] = i;
+  }
+  pieces_ = std::move(pieces);
+  for (std::uint32_t& piece : seen_) piece = now[piece];
+  std::erase(seen_, ContrastMemory::kNew);
 }
 
 /// Calls `visit` with the pixels where the contour was since the last update, had it been moved aside; false:

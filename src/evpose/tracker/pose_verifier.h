@@ -36,6 +36,9 @@ class PoseVerifier {
 
   /// The pose comes from elsewhere: what was seen does not count any more.
   void restart();
+  /// The pieces are those of another part of the map from now on: number i was `before[i]`, or is new
+  /// (ContrastMemory::kNew).
+  void rearrange(std::span<const std::uint32_t> before);
   /// One update of several: all events of its span, and the contours at its time; `elapsed_s`: since the
   /// last one that was looked at.
   void add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s,

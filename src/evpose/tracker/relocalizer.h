@@ -60,6 +60,10 @@ class Relocalizer {
   bool has_tried_all() const;
   /// The pose found was wrong: searches again around where the search began.
   void restart_search(TimeNs t);
+  /// The map's index is that of another part from now on. Not while searching.
+  void forget_map() {
+    if (workspace_) workspace_ = std::make_unique<Workspace>(scene_, motion_);
+  }
   /// How the body has moved since the last call of this or process(), while a pose found is verified.
   void add_motion(const ImuIncrement& motion) { since_slice_ = joined(since_slice_, motion); }
 

@@ -20,7 +20,14 @@ constexpr TimeNs kLookAside = 13 * kNsPerMs;
 const char* const kTimeIsPast = "the time offset has changed";  // by more than an update
 const char* const kAligning = "aligning the first view";
 
+/// Of segments that have offsets; 0: none have.
+double offset_segment_m(const TrackerConfig& config) {
+  return config.fusion.segment_offsets == SegmentOffsetUse::on ? config.fusion.segments.length_m : 0;
+}
+
 }  // namespace
+
+double part_radius_m(const TrackerConfig& config) { return config.visible.far_m + MapPager::kMargin_m; }
 
 Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, const TrackerConfig& config,
                                                    const StartState& start, StageClock clock,
@@ -55,29 +62,27 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       adjusted_(std::move(adjusted)),
       config_(config),
       T_body_cam_(setup.T_body_cam),
-      index_(*setup_.map),
-      segments_(cut_into_segments(*setup_.map)),
-      contours_(index_, segments_, *setup_.camera, adjusted_ ? adjusted_->given() : *setup_.camera,
+      map_(setup_.map, offset_segment_m(config)),
+      pager_(setup_.map_parts, setup_.map_middle, config.visible.far_m, offset_segment_m(config)),
+      contours_(map_.index, map_.segments, *setup_.camera, adjusted_ ? adjusted_->given() : *setup_.camera,
                 T_body_cam_, visible_config(config), config.event_registration.map_sigma_m,
                 config.threads > 1),
       interest_(setup_.camera->size().width, setup_.camera->size().height),
       preprocessor_(setup_.camera->size().width, setup_.camera->size().height, config.events),
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
-      registration_(make_registration(config, setup_.camera->size(), *setup_.map, segments_)),
+      registration_(make_registration(config, setup_.camera->size(), *setup_.map, map_.segments)),
       fusion_(std::move(fusion)),
       supervisor_(config.relocalization, config.health,
-                  Relocalizer({index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
+                  Relocalizer({map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                                config.visible, config.event_registration}),
-                  PoseVerifier(setup_.camera->size(), segments_.count,
-                               config.visible.occlusion && !index_.occluders().empty())),
+                  PoseVerifier(setup_.camera->size(), map_.segments.count,
+                               config.visible.occlusion && !map_.index.occluders().empty())),
       reporter_(std::move(clock)),
       start_t_(start.t),
       last_update_(start.t),
       next_update_(start.t + from_seconds(1 / config.rate_hz)),
       last_look_aside_(start.t) {
-  if (config.fusion.segment_offsets == SegmentOffsetUse::on)
-    offset_segments_ = cut_into_segments(*setup_.map, config.fusion.segments.length_m).of_point;
   keep_time_surface(false);
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());
@@ -85,7 +90,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   const CalibrationConfig& uncertain = config.fusion.calibration;
   if (uncertain.intrinsics || uncertain.rotation || uncertain.translation)
     start_alignment_.emplace(
-        RelocalizerScene{index_, segments_, *setup_.camera, fusion_->propagator().gravity_map(),
+        RelocalizerScene{map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                          config.visible, config.event_registration},
         adjusted_.get());
   contours_.prepare(start.T_map_body);
@@ -151,6 +156,7 @@ void Tracker::prepare_update() {
   forecast_.reset();
   interest_.clear();
   contours_.choose(fusion_->state().nav.T_map_body);
+  page_map();
   if (update_number_ > 0 && !supervisor_.searching() && !start_alignment_) {
     const FusionState coming = forecast();
     const double span_s = to_seconds(next_update_ - last_update_);
@@ -162,6 +168,18 @@ void Tracker::prepare_update() {
   const bool all = !forecast_ || verdict_callback_ || looks_aside_;
   preprocessor_.set_interest(all ? nullptr : &interest_);
   reporter_.add_preparation(reporter_.now_s() - began_s);
+}
+
+/// Another part of the map, if the camera has gone so far, between two choices of points.
+void Tracker::page_map() {
+  const bool may_take = !contours_.choosing() && !supervisor_.searching() && !start_alignment_;
+  const auto next = pager_.next(fusion_->state().nav.T_map_body.p, map_, may_take);
+  if (!next) return;
+  setup_.map = next->prepared.map;
+  map_ = std::move(next->prepared);
+  contours_.renumber(next->point_now);
+  registration_->rearrange_segments(next->segment_before, next->contrast);
+  supervisor_.rearrange(next->segment_before);
 }
 
 /// The contours as the prediction has them, unless they are as the forecast had them but for a small change.
@@ -251,7 +269,8 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(),
                               covariance};
   problem.surface = preprocessor_.surface();
-  problem.view = &contours_.view();
+  const ContourView view = contours_.view();
+  problem.view = &view;
   problem.T_map_body = fusion_->state().nav.T_map_body;
   if (verdict_callback_) problem.verdicts = &verdicts_;
   if (forecast_) {
@@ -273,12 +292,12 @@ int Tracker::darker_side(std::uint32_t segment) const {
 ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
   const Pose& predicted = fusion_->state().nav.T_map_body;
   const ContourSample& s = contours_.samples()[offset.sample];
-  ContourOffset out{predicted.inverse() * setup_.map->position(s.point),
+  ContourOffset out{predicted.inverse() * map_.map->position(s.point),
                     predicted.q.conjugate() * Eigen::Vector3d(s.jacobian.head<3>()),
                     offset.offset_px,
                     offset.weight,
-                    offset_segments_.empty() ? s.segment : offset_segments_[s.point],
-                    setup_.map->points[s.point].sigma,
+                    map_.offset_segments.empty() ? s.segment : map_.offset_segments[s.point],
+                    map_.map->points[s.point].sigma,
                     s.normal_px,
                     s.speed_px_s,
                     s.normal_side * darker_side(s.segment)};
@@ -317,10 +336,10 @@ std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) cons
 }
 
 ContourMap Tracker::map_with_learnt_contrast() const {
-  ContourMap out = *setup_.map;
+  ContourMap out = *map_.map;
   const ContrastMemory* learnt = registration_->contrast();
   for (std::size_t i = 0; learnt != nullptr && i < out.points.size(); ++i)
-    if (const int sign = learnt->map_contrast(segments_.of_point[i]); sign != 0)
+    if (const int sign = learnt->map_contrast(map_.segments.of_point[i]); sign != 0)
       out.points[i].contrast = static_cast<std::int8_t>(sign);
   return out;
 }

@@ -10,12 +10,12 @@
 #include "evpose/camera/adjusted_camera.h"
 #include "evpose/camera/calibration_sigma.h"
 #include "evpose/core/error.h"
-#include "evpose/map/contour_segments.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/contour_selection.h"
 #include "evpose/tracker/imu_gate.h"
 #include "evpose/tracker/imu_rate_output.h"
 #include "evpose/tracker/input_queue.h"
+#include "evpose/tracker/map_pager.h"
 #include "evpose/tracker/pose_supervisor.h"
 #include "evpose/tracker/snapshot.h"
 #include "evpose/tracker/start_alignment.h"
@@ -36,7 +36,14 @@ struct TrackerSetup {
   /// How wrong `camera` and T_body_cam and the time of the IMU may be; none: they are known. Without an IMU,
   /// so are intrinsics of which it states nothing.
   std::optional<CalibrationSigma> calibration_sigma = {};
+  /// Where the rest of the map is had from; `map` is then the part around `map_middle`, near the start, out
+  /// to part_radius_m(). None: `map` is all of it.
+  MapParts map_parts = {};
+  Eigen::Vector3d map_middle = Eigen::Vector3d::Zero();
 };
+
+/// Out to where a part of a map has to reach around the camera.
+double part_radius_m(const TrackerConfig& config);
 
 /// Where it starts.
 struct StartState {
@@ -84,7 +91,8 @@ class Tracker {
   const EventPreprocessor& events() const { return preprocessor_; }
   /// What the fusion found to be wrong with the given calibration, if it was asked to look.
   Calibration calibration() const { return fusion_->calibration(); }
-  /// The map with the signs of contrast that events have told so far; the others are the map's.
+  /// The map, or the part of it that is held, with the signs of contrast that events have told so far; the
+  /// others are the map's.
   ContourMap map_with_learnt_contrast() const;
 
   /// Events and contours at the last update, for pictures; empty of events unless a time surface is kept.
@@ -101,6 +109,7 @@ class Tracker {
   bool feed_until(TimeNs t);
   void make_update();
   void prepare_update();
+  void page_map();
   FusionState forecast() const;
   void see_contours(double span_s);
   TimeNs imu_time(TimeNs t) const;  ///< of an instant of the camera's clock
@@ -121,8 +130,8 @@ class Tracker {
   std::shared_ptr<AdjustedCamera> adjusted_;  ///< is setup_.camera, or null
   TrackerConfig config_;
   Pose T_body_cam_;  ///< as given, and as the fusion has corrected it
-  ContourIndex index_;
-  ContourSegments segments_;  ///< of the map, for the contrast
+  PreparedMap map_;
+  MapPager pager_;
   ContourSelection contours_;
   std::optional<NavState> forecast_;  ///< that the contours were projected at, and events are looked at with
   InterestMap interest_;
@@ -140,8 +149,7 @@ class Tracker {
   std::function<void(const Update&)> update_callback_;
   VerdictCallback verdict_callback_;
   std::vector<EventVerdict> verdicts_;
-  std::vector<ContourOffset> offsets_;          ///< of the last measurement, for a fusion that takes them
-  std::vector<std::uint32_t> offset_segments_;  ///< of each map point, where segments have offsets
+  std::vector<ContourOffset> offsets_;  ///< of the last measurement, for a fusion that takes them
 
   TimeNs start_t_, last_update_, next_update_;
   TimeNs last_look_aside_;    ///< of the pose supervisor, when it last verified the pose

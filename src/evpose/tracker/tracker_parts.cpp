@@ -14,14 +14,6 @@ double distance_outside(const ContourMap& map, const Eigen::Vector3d& p) {
   return (low.cast<double>() - relative).cwiseMax(relative - high.cast<double>()).cwiseMax(0).norm();
 }
 
-/// The sign that most points of a segment state.
-std::vector<int> contrast_of_segments(const ContourMap& map, const ContourSegments& segments) {
-  std::vector<int> sum(segments.count, 0);
-  for (std::size_t i = 0; i < map.points.size(); ++i) sum[segments.of_point[i]] += map.points[i].contrast;
-  for (int& sign : sum) sign = (sign > 0) - (sign < 0);
-  return sum;
-}
-
 }  // namespace
 
 bool states_errors(const ContourMap& map) {

@@ -210,6 +210,7 @@ Status complete_contours(ContourMap& map) {
   fill_lengths(map, positions, spacing);
   if (without > 0) {
     std::erase_if(map.points, [](const ContourPoint& p) { return p.tangent.isZero(); });
+    map.pages.clear();
     log_warning(
         text(map.source, ": ", without, " of ", all, " points have no neighbours along a contour: left out"));
   }

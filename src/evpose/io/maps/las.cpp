@@ -14,7 +14,6 @@ namespace {
 constexpr std::size_t kShortestHeader = 227;  // of LAS 1.0 .. 1.2
 constexpr std::size_t kLongHeader = 375;      // of LAS 1.4
 constexpr std::size_t kShortestPoint = 14;    // x y z and intensity
-constexpr std::size_t kRowsAtOnce = 65536;
 
 template <class T>
 T at(const std::vector<char>& bytes, std::size_t offset) {
@@ -25,7 +24,7 @@ T at(const std::vector<char>& bytes, std::size_t offset) {
 
 }  // namespace
 
-Expected<PointTable> read_las(const std::string& path) {
+Status visit_las(const std::string& path, const PointBlocks& visit) {
   const auto file = open_to_read(path);
   if (!file) return file.error();
   std::FILE* stream = file->stream.get();
@@ -60,26 +59,32 @@ Expected<PointTable> read_las(const std::string& path) {
       return Error{path, "scale or offset of the coordinates is not a number",
                    "the file is damaged; copy it again"};
   }
-  PointTable table;
-  table.names = {"x", "y", "z", "intensity"};
-  table.columns.resize(4);
-  for (auto& column : table.columns) column.reserve(points);
+  PointTable block;
+  block.names = {"x", "y", "z", "intensity"};
+  block.columns.resize(4);
   if (::fseeko(stream, static_cast<off_t>(data), SEEK_SET) != 0)
     return Error{path, "cannot be read", "check the disk"};
-  std::vector<char> rows(std::min<std::uint64_t>(kRowsAtOnce, points) *
+  std::vector<char> rows(std::min<std::uint64_t>(kPointBlock, points) *
                          row_bytes);  // no more than the file has
-  for (std::uint64_t done = 0; done < points;) {
-    const std::size_t now = static_cast<std::size_t>(std::min<std::uint64_t>(kRowsAtOnce, points - done));
+  std::uint64_t done = 0;
+  do {
+    const std::size_t now = static_cast<std::size_t>(std::min<std::uint64_t>(kPointBlock, points - done));
+    for (auto& column : block.columns) column.clear();
     if (std::fread(rows.data(), row_bytes, now, stream) != now)
       return Error{path, text("ends after ", done, " of ", points, " points"), "copy it again"};
     for (std::size_t i = 0; i < now; ++i) {
       for (std::size_t k = 0; k < 3; ++k)
-        table.columns[k].push_back(at<std::int32_t>(rows, i * row_bytes + 4 * k) * scale[k] + offset[k]);
-      table.columns[3].push_back(at<std::uint16_t>(rows, i * row_bytes + 12));
+        block.columns[k].push_back(at<std::int32_t>(rows, i * row_bytes + 4 * k) * scale[k] + offset[k]);
+      block.columns[3].push_back(at<std::uint16_t>(rows, i * row_bytes + 12));
     }
+    if (auto status = visit(block); !status) return status;
     done += now;
-  }
-  return table;
+  } while (done < points);
+  return {};
+}
+
+Expected<PointTable> read_las(const std::string& path) {
+  return joined_blocks([&](const PointBlocks& visit) { return visit_las(path, visit); });
 }
 
 }  // namespace evpose

@@ -5,102 +5,17 @@
 #include <array>
 #include <cmath>
 
-#include "evpose/io/files/crc32.h"
 #include "evpose/io/files/input_file.h"
 #include "evpose/io/hdf5/hdf5_file.h"
+#include "evpose/io/maps/map_columns.h"
 #include "evpose/io/maps/map_h5_meta.h"
+#include "evpose/io/maps/map_h5_pages.h"
 #include "evpose/map/triangulation.h"
 
 namespace evpose {
 namespace {
 
-constexpr std::uint64_t kMostRows = std::uint64_t{1} << 31;
-constexpr double kFarthest = 1e7;  // m
 constexpr std::array<char, 4> kHdf5Magic = {'\x89', 'H', 'D', 'F'};
-const std::string kDamaged = "the file is damaged; copy or build it again";
-
-template <class T>
-constexpr NumberType number_type();
-template <>
-constexpr NumberType number_type<std::int8_t>() {
-  return NumberType::i8;
-}
-template <>
-constexpr NumberType number_type<std::uint8_t>() {
-  return NumberType::u8;
-}
-template <>
-constexpr NumberType number_type<std::uint16_t>() {
-  return NumberType::u16;
-}
-template <>
-constexpr NumberType number_type<std::int32_t>() {
-  return NumberType::i32;
-}
-template <>
-constexpr NumberType number_type<std::uint32_t>() {
-  return NumberType::u32;
-}
-template <>
-constexpr NumberType number_type<std::uint64_t>() {
-  return NumberType::u64;
-}
-template <>
-constexpr NumberType number_type<float>() {
-  return NumberType::f32;
-}
-template <>
-constexpr NumberType number_type<double>() {
-  return NumberType::f64;
-}
-
-/// Reads datasets whole, each against its checksum. Remembers the first failure, so that reads can be listed.
-class Reader {
- public:
-  explicit Reader(const Hdf5File& file) : file_(file) {}
-
-  const Status& status() const { return status_; }
-
-  /// `width` numbers a row; `rows` rows, any number if -1. Empty after a failure.
-  template <class T>
-  std::vector<T> column(const std::string& name, std::uint64_t width, std::int64_t rows) {
-    if (!status_) return {};
-    const auto dataset = file_.dataset(name, width == 1 ? 1 : 2);
-    if (!dataset) return fail<T>(dataset.error());
-    const std::string where = file_.path() + ": " + name;
-    if (dataset->type() != number_type<T>() || (width > 1 && dataset->shape()[1] != width))
-      return fail<T>({where, "is of another type or width than map files have", "build the map again"});
-    if (dataset->rows() >= kMostRows || (rows >= 0 && dataset->rows() != static_cast<std::uint64_t>(rows)))
-      return fail<T>({where, text("has ", dataset->rows(), " rows instead of ", rows), kDamaged});
-    std::vector<T> values(dataset->rows() * width);
-    if (auto read = dataset->read(number_type<T>(), 0, dataset->rows(), values.data()); !read)
-      return fail<T>(read.error());
-    const auto crc = dataset->attribute_u32("crc32");
-    if (!crc) return fail<T>({where, "has no checksum (attribute crc32)", "build the map again"});
-    if (!crc32_agrees(*crc, crc32(values.data(), values.size() * sizeof(T))))
-      return fail<T>({where, "does not match its checksum", kDamaged});
-    if constexpr (std::is_floating_point_v<T>) {
-      const auto wrong =
-          std::find_if(values.begin(), values.end(), [](T v) { return !(std::abs(v) <= kFarthest); });
-      if (wrong != values.end())
-        return fail<T>({where,
-                        text("row ", static_cast<std::uint64_t>(wrong - values.begin()) / width,
-                             " is not finite or out of range"),
-                        kDamaged});
-    }
-    return values;
-  }
-
- private:
-  template <class T>
-  std::vector<T> fail(Error error) {
-    status_ = std::move(error);
-    return {};
-  }
-
-  const Hdf5File& file_;
-  Status status_;
-};
 
 Eigen::Vector3f row3(const std::vector<float>& values, std::size_t i) {
   return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
@@ -112,7 +27,9 @@ std::string meta_text(const Hdf5File& file, const std::string& name) {
   return values && values->size() == 1 ? values->front() : "";
 }
 
-Status read_meta(const Hdf5File& file, ContourMap& map) {
+}  // namespace
+
+Status read_map_meta(const Hdf5File& file, ContourMap& map) {
   const std::string where = file.path() + ": /meta";
   if (meta_text(file, "format") != "evpose-map")
     return Error{file.path(), "is HDF5, but not a map file (no /meta with format evpose-map)", "give a map"};
@@ -129,35 +46,39 @@ Status read_meta(const Hdf5File& file, ContourMap& map) {
   if (meta_text(file, "units") != "m")
     return Error{where, "units are '" + meta_text(file, "units") + "', not m", "use metres"};
   const auto anchor = file.attribute_numbers("/meta", "anchor");
-  if (!anchor || anchor->size() != 3) return Error{where, "no anchor of three numbers", kDamaged};
+  if (!anchor || anchor->size() != 3) return Error{where, "no anchor of three numbers", kMapDamaged};
   map.anchor = {(*anchor)[0], (*anchor)[1], (*anchor)[2]};
-  if (!(map.anchor.cwiseAbs().maxCoeff() <= kFarthest))
-    return Error{where, "the anchor is not finite or out of range", kDamaged};
+  if (!(map.anchor.cwiseAbs().maxCoeff() <= kFarthestInMap))
+    return Error{where, "the anchor is not finite or out of range", kMapDamaged};
   map.frame = meta_text(file, "frame");
   return {};
 }
 
-Status read_points(const Hdf5File& file, Reader& reader, ContourMap& map) {
+namespace {
+
+Status read_points(const Hdf5File& file, MapColumns& columns, ContourMap& map) {
   const auto xyz_dataset = file.dataset("/points/xyz", 2);
   if (!xyz_dataset) return xyz_dataset.error();
   std::vector<float> xyz;
   if (xyz_dataset->type() == NumberType::f64) {
     const bool absolute = xyz_dataset->attribute_u32("absolute").value_or(0) == 1;
-    const auto exact = reader.column<double>("/points/xyz", 3, -1);
+    const auto exact = columns.column<double>("/points/xyz", 3, -1);
     for (std::size_t k = 0; k < exact.size(); ++k)
       xyz.push_back(
           static_cast<float>(exact[k] - (absolute ? map.anchor[static_cast<Eigen::Index>(k % 3)] : 0)));
   } else {
-    xyz = reader.column<float>("/points/xyz", 3, -1);
+    xyz = columns.column<float>("/points/xyz", 3, -1);
   }
   const auto rows = static_cast<std::int64_t>(xyz.size() / 3);
-  const auto tangent = reader.column<float>("/points/tangent", 3, rows);
-  const auto normal = reader.column<float>("/points/normal_a", 3, rows);
+  const auto tangent = columns.column<float>("/points/tangent", 3, rows);
+  const auto normal = columns.column<float>("/points/normal_a", 3, rows);
   const bool has_b = file.has("/points/normal_b");
-  const auto normal_b = has_b ? reader.column<float>("/points/normal_b", 3, rows) : std::vector<float>();
+  const auto normal_b = has_b ? columns.column<float>("/points/normal_b", 3, rows) : std::vector<float>();
   const bool own_sigma = file.has("/points/sigma");
-  const auto sigma = own_sigma ? reader.column<float>("/points/sigma", 1, rows) : std::vector<float>();
-  if (!reader.status()) return reader.status();
+  const auto sigma = own_sigma ? columns.column<float>("/points/sigma", 1, rows) : std::vector<float>();
+  const bool own_length = file.has("/points/length");
+  const auto length = own_length ? columns.column<float>("/points/length", 1, rows) : std::vector<float>();
+  if (!columns.status()) return columns.status();
   map.points.resize(static_cast<std::size_t>(rows));
   for (std::size_t i = 0; i < map.points.size(); ++i) {
     ContourPoint& p = map.points[i];
@@ -166,6 +87,7 @@ Status read_points(const Hdf5File& file, Reader& reader, ContourMap& map) {
     p.normal = row3(normal, i);
     if (has_b) p.normal_b = row3(normal_b, i);
     if (own_sigma) p.sigma = std::max(sigma[i], 0.0F);
+    if (own_length) p.length = std::max(length[i], 0.0F);
   }
   return {};
 }
@@ -187,103 +109,123 @@ void share_length(ContourPoint* points, std::size_t count, float length, bool cl
         sum > 0 ? share[i] * (length > 0 ? length / sum : 1) : length / static_cast<float>(count);
 }
 
-Status read_contours(const Hdf5File& file, Reader& reader, ContourMap& map) {
-  const auto start = reader.column<std::uint64_t>("/contours/start", 1, -1);
+Status read_contours(const Hdf5File& file, MapColumns& columns, ContourMap& map) {
+  const auto start = columns.column<std::uint64_t>("/contours/start", 1, -1);
   const auto contours = static_cast<std::int64_t>(start.size());
-  const auto count = reader.column<std::uint32_t>("/contours/count", 1, contours);
-  const auto kind = reader.column<std::uint8_t>("/contours/kind", 1, contours);
-  const auto plane_a = reader.column<std::int32_t>("/contours/plane_a", 1, contours);
-  const auto plane_b = reader.column<std::int32_t>("/contours/plane_b", 1, contours);
-  const auto length = reader.column<float>("/contours/length", 1, contours);
-  const auto sigma = reader.column<float>("/contours/sigma", 1, contours);
-  const auto contrast = reader.column<std::int8_t>("/contours/contrast_sign", 1, contours);
-  const auto flags = reader.column<std::uint16_t>("/contours/flags", 1, contours);
-  if (!reader.status()) return reader.status();
+  const auto count = columns.column<std::uint32_t>("/contours/count", 1, contours);
+  const auto kind = columns.column<std::uint8_t>("/contours/kind", 1, contours);
+  const auto plane_a = columns.column<std::int32_t>("/contours/plane_a", 1, contours);
+  const auto plane_b = columns.column<std::int32_t>("/contours/plane_b", 1, contours);
+  const auto length = columns.column<float>("/contours/length", 1, contours);
+  const auto sigma = columns.column<float>("/contours/sigma", 1, contours);
+  const auto contrast = columns.column<std::int8_t>("/contours/contrast_sign", 1, contours);
+  const auto flags = columns.column<std::uint16_t>("/contours/flags", 1, contours);
+  if (!columns.status()) return columns.status();
+  const std::uint64_t first_point = columns.first_of(MapRows::points);
+  const auto first_plane = static_cast<std::int32_t>(columns.first_of(MapRows::planes));
+  const auto first_contour = static_cast<std::int32_t>(columns.first_of(MapRows::contours));
   std::int64_t planes = -1;  // unknown
-  if (file.has("/planes/d"))
-    planes = static_cast<std::int64_t>(reader.column<double>("/planes/d", 1, -1).size());
-  if (!reader.status()) return reader.status();
-  const bool own_sigma = file.has("/points/sigma");
+  if (columns.page() != nullptr)
+    planes = static_cast<std::int64_t>(columns.page()->count_of(MapRows::planes));
+  else if (file.has("/planes/d"))
+    planes = static_cast<std::int64_t>(columns.column<double>("/planes/d", 1, -1).size());
+  if (!columns.status()) return columns.status();
+  const bool own_sigma = file.has("/points/sigma"), own_length = file.has("/points/length");
   std::vector<bool> taken(map.points.size(), false);
   for (std::size_t c = 0; c < start.size(); ++c) {
     const std::string where = file.path() + ": /contours";
-    if (start[c] > map.points.size() || count[c] > map.points.size() - start[c])
-      return Error{where, text("row ", c, " reaches beyond the ", map.points.size(), " points"), kDamaged};
+    const std::uint64_t from = start[c] - first_point;  // huge if the page begins later
+    if (from > map.points.size() || count[c] > map.points.size() - from)
+      return Error{where, text("row ", c, " reaches beyond the ", map.points.size(), " points"), kMapDamaged};
     for (const std::int32_t plane : {plane_a[c], plane_b[c]})
-      if (plane < -1 || (planes >= 0 && plane >= planes))
-        return Error{where, text("row ", c, " names plane ", plane, " of ", planes), kDamaged};
-    ContourPoint* points = map.points.data() + start[c];
+      if (plane < -1 || (planes >= 0 && plane >= first_plane + planes) || (plane >= 0 && plane < first_plane))
+        return Error{where, text("row ", c, " names plane ", plane, " of ", planes), kMapDamaged};
+    ContourPoint* points = map.points.data() + from;
     for (std::size_t i = 0; i < count[c]; ++i) {
-      if (taken[start[c] + i]) return Error{where, text("row ", c, " shares points with another"), kDamaged};
-      taken[start[c] + i] = true;
-      points[i].contour = count[c] > 1 ? static_cast<std::int32_t>(c) : -1;
+      if (taken[from + i]) return Error{where, text("row ", c, " shares points with another"), kMapDamaged};
+      taken[from + i] = true;
+      points[i].contour = count[c] > 1 ? first_contour + static_cast<std::int32_t>(c) : -1;
       points[i].kind = contour_kind(kind[c]);
       points[i].plane_a = plane_a[c];
       points[i].plane_b = plane_b[c];
       points[i].contrast = static_cast<std::int8_t>(std::clamp<int>(contrast[c], -1, 1));
       if (!own_sigma) points[i].sigma = std::max(sigma[c], 0.0F);
     }
-    if (count[c] > 0) share_length(points, count[c], std::max(length[c], 0.0F), (flags[c] & 1) != 0);
+    if (count[c] > 0 && !own_length)
+      share_length(points, count[c], std::max(length[c], 0.0F), (flags[c] & 1) != 0);
   }
   return {};
 }
 
-Status read_mesh(const Hdf5File& file, Reader& reader, TriangleMesh& mesh) {
+Status read_mesh(const Hdf5File& file, MapColumns& columns, TriangleMesh& mesh) {
   if (!file.has("/mesh/vertices")) return {};
-  const auto vertices = reader.column<float>("/mesh/vertices", 3, -1);
-  const auto triangles = reader.column<std::uint32_t>("/mesh/triangles", 3, -1);
-  if (!reader.status()) return reader.status();
+  const auto vertices = columns.column<float>("/mesh/vertices", 3, -1);
+  const auto triangles = columns.column<std::uint32_t>("/mesh/triangles", 3, -1);
+  if (!columns.status()) return columns.status();
   for (std::size_t i = 0; i < vertices.size() / 3; ++i) mesh.vertices.push_back(row3(vertices, i));
   for (std::size_t i = 0; i < triangles.size() / 3; ++i) {
     for (std::size_t k = 0; k < 3; ++k)
       if (triangles[3 * i + k] >= mesh.vertices.size())
         return Error{file.path() + ": /mesh/triangles",
                      text("row ", i, " names vertex ", triangles[3 * i + k], " of ", mesh.vertices.size()),
-                     kDamaged};
+                     kMapDamaged};
     mesh.triangles.push_back({triangles[3 * i], triangles[3 * i + 1], triangles[3 * i + 2]});
   }
   return {};
 }
 
-Status read_planes(const Hdf5File& file, Reader& reader, ContourMap& map) {
+Status read_planes(const Hdf5File& file, MapColumns& columns, ContourMap& map) {
   if (!file.has("/planes/d")) return {};
-  const auto d = reader.column<double>("/planes/d", 1, -1);
+  const auto d = columns.column<double>("/planes/d", 1, -1);
   const auto rows = static_cast<std::int64_t>(d.size());
-  const auto normal = reader.column<float>("/planes/normal", 3, rows);
-  const auto inliers = reader.column<std::uint32_t>("/planes/inliers", 1, rows);
-  const auto rms = reader.column<float>("/planes/rms", 1, rows);
-  if (!reader.status()) return reader.status();
+  const auto normal = columns.column<float>("/planes/normal", 3, rows);
+  const auto inliers = columns.column<std::uint32_t>("/planes/inliers", 1, rows);
+  const auto rms = columns.column<float>("/planes/rms", 1, rows);
+  if (!columns.status()) return columns.status();
   for (std::size_t i = 0; i < d.size(); ++i)
     map.planes.push_back({row3(normal, i), d[i], inliers[i], rms[i]});
   return {};
 }
 
-Status read_polygons(const Hdf5File& file, Reader& reader, ContourMap& map) {
+Status read_polygons(const Hdf5File& file, MapColumns& columns, ContourMap& map) {
   if (!file.has("/polygons/start")) return {};
-  const auto vertices = reader.column<float>("/polygons/vertices", 3, -1);
-  const auto start = reader.column<std::uint64_t>("/polygons/start", 1, -1);
+  const auto vertices = columns.column<float>("/polygons/vertices", 3, -1);
+  const auto start = columns.column<std::uint64_t>("/polygons/start", 1, -1);
   const auto rows = static_cast<std::int64_t>(start.size());
-  const auto count = reader.column<std::uint32_t>("/polygons/count", 1, rows);
-  const auto plane = reader.column<std::int32_t>("/polygons/plane", 1, rows);
-  const auto hole_of = reader.column<std::int32_t>("/polygons/hole_of", 1, rows);
-  if (!reader.status()) return reader.status();
+  const auto count = columns.column<std::uint32_t>("/polygons/count", 1, rows);
+  const auto plane = columns.column<std::int32_t>("/polygons/plane", 1, rows);
+  const auto hole_of = columns.column<std::int32_t>("/polygons/hole_of", 1, rows);
+  if (file.has("/polygons/double_sided"))  // all are
+    static_cast<void>(columns.column<std::uint8_t>("/polygons/double_sided", 1, rows));
+  if (!columns.status()) return columns.status();
   const std::string where = file.path() + ": /polygons";
   const auto planes = static_cast<std::int64_t>(map.planes.size());
+  const std::uint64_t first_vertex = columns.first_of(MapRows::vertices);
+  const auto first_plane = static_cast<std::int32_t>(columns.first_of(MapRows::planes));
+  const auto first_polygon = static_cast<std::int32_t>(columns.first_of(MapRows::polygons));
+  const auto within = [](std::int32_t number, std::int32_t first, std::int64_t all) {
+    return number == -1 || (number >= first && number < first + all);
+  };
+  const auto moved = [](std::int32_t number, std::int32_t first) {
+    return number < 0 ? number : number - first;
+  };
   std::uint64_t untaken = vertices.size() / 3;
   for (std::size_t g = 0; g < start.size(); ++g) {
-    if (start[g] > vertices.size() / 3 || count[g] > vertices.size() / 3 - start[g])
+    const std::uint64_t from = start[g] - first_vertex;
+    if (from > vertices.size() / 3 || count[g] > vertices.size() / 3 - from)
       return Error{where, text("row ", g, " reaches beyond the ", vertices.size() / 3, " vertices"),
-                   kDamaged};
-    if (count[g] > untaken) return Error{where, text("row ", g, " shares vertices with another"), kDamaged};
+                   kMapDamaged};
+    if (count[g] > untaken)
+      return Error{where, text("row ", g, " shares vertices with another"), kMapDamaged};
     untaken -= count[g];
-    if (plane[g] < -1 || plane[g] >= planes)
-      return Error{where, text("row ", g, " names plane ", plane[g], " of ", planes), kDamaged};
-    if (hole_of[g] < -1 || hole_of[g] >= rows)
-      return Error{where, text("row ", g, " is a hole of row ", hole_of[g], " of ", rows), kDamaged};
+    if (!within(plane[g], first_plane, planes))
+      return Error{where, text("row ", g, " names plane ", plane[g], " of ", planes), kMapDamaged};
+    if (!within(hole_of[g], first_polygon, rows))
+      return Error{where, text("row ", g, " is a hole of row ", hole_of[g], " of ", rows), kMapDamaged};
     MapPolygon polygon;
-    polygon.plane = plane[g];
-    polygon.hole_of = hole_of[g];
-    for (std::size_t i = 0; i < count[g]; ++i) polygon.vertices.push_back(row3(vertices, start[g] + i));
+    polygon.plane = moved(plane[g], first_plane);
+    polygon.hole_of = moved(hole_of[g], first_polygon);
+    for (std::size_t i = 0; i < count[g]; ++i) polygon.vertices.push_back(row3(vertices, from + i));
     map.polygons.push_back(std::move(polygon));
   }
   return {};
@@ -297,25 +239,45 @@ Status check_whole(const Hdf5File& file) {
   if (!crc) return crc.error();
   if (!(stored->front() >= 0 && stored->front() <= UINT32_MAX) ||
       !crc32_agrees(static_cast<std::uint32_t>(stored->front()), *crc))
-    return Error{file.path() + ": /meta", "does not match its checksum", kDamaged};
+    return Error{file.path() + ": /meta", "does not match its checksum", kMapDamaged};
   return {};
 }
 
 }  // namespace
+
+Expected<ContourMap> read_map_page(const Hdf5File& file, const MapFilePage& page) {
+  ContourMap map;
+  map.source = file.path();
+  if (auto status = read_map_meta(file, map); !status) return status.error();
+  MapColumns columns(file, &page);
+  if (auto status = read_points(file, columns, map); !status) return status.error();
+  if (auto status = read_contours(file, columns, map); !status) return status.error();
+  if (auto status = read_planes(file, columns, map); !status) return status.error();
+  if (auto status = read_polygons(file, columns, map); !status) return status.error();
+  if (auto status = columns.finish(); !status) return status.error();
+  map.occluders = triangulated(map.planes, map.polygons);
+  return map;
+}
 
 Expected<ContourMap> read_map_h5(const std::string& path) {
   const auto file = Hdf5File::open(path);
   if (!file) return file.error();
   ContourMap map;
   map.source = path;
-  if (auto status = read_meta(*file, map); !status) return status.error();
-  Reader reader(*file);
-  if (auto status = read_points(*file, reader, map); !status) return status.error();
-  if (auto status = read_contours(*file, reader, map); !status) return status.error();
-  if (auto status = read_mesh(*file, reader, map.occluders); !status) return status.error();
-  if (auto status = read_planes(*file, reader, map); !status) return status.error();
-  if (auto status = read_polygons(*file, reader, map); !status) return status.error();
+  if (auto status = read_map_meta(*file, map); !status) return status.error();
+  MapColumns columns(*file);
+  if (auto status = read_points(*file, columns, map); !status) return status.error();
+  if (auto status = read_contours(*file, columns, map); !status) return status.error();
+  if (auto status = read_mesh(*file, columns, map.occluders); !status) return status.error();
+  if (auto status = read_planes(*file, columns, map); !status) return status.error();
+  if (auto status = read_polygons(*file, columns, map); !status) return status.error();
   if (auto status = check_whole(*file); !status) return status.error();
+  const auto pages = read_map_pages(*file);
+  if (!pages) return pages.error();
+  for (const MapFilePage& page : *pages)
+    map.pages.push_back({static_cast<std::uint32_t>(page.end_of(MapRows::points)),
+                         static_cast<std::uint32_t>(page.end_of(MapRows::planes)),
+                         static_cast<std::uint32_t>(page.end_of(MapRows::polygons))});
   if (map.occluders.triangles.empty()) map.occluders = triangulated(map.planes, map.polygons);
   return map;
 }
@@ -337,13 +299,13 @@ Expected<MapPlacement> read_map_placement(const std::string& path) {
     const Eigen::Matrix3d R = M.topLeftCorner<3, 3>();
     if (!M.allFinite() || !((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6) ||
         R.determinant() < 0)
-      return Error{path + ": /meta", "T_ned_map is no rigid transform", kDamaged};
+      return Error{path + ": /meta", "T_ned_map is no rigid transform", kMapDamaged};
     out.T_ned_map = Pose::from_matrix(M);
   }
   if (const auto llh = file->attribute_numbers("/meta", "origin_llh")) {
     if (llh->size() != 3 || !(std::abs((*llh)[0]) <= 90) || !(std::abs((*llh)[1]) <= 180) ||
-        !(std::abs((*llh)[2]) <= kFarthest))
-      return Error{path + ": /meta", "origin_llh is no place on earth", kDamaged};
+        !(std::abs((*llh)[2]) <= kFarthestInMap))
+      return Error{path + ": /meta", "origin_llh is no place on earth", kMapDamaged};
     out.origin_llh = Eigen::Vector3d((*llh)[0], (*llh)[1], (*llh)[2]);
   }
   return out;

@@ -12,9 +12,9 @@ namespace evpose {
 
 /// map.h5 1.0: contours, points, planes with their polygons and the mesh of occluders; without a mesh the
 /// polygons are the occluders, triangulated. A contour of one row is an isolated point, as is a row that
-/// belongs to no contour; lengths of points are shares of their contour's. Errors: not a map file, another
-/// major version or unit, an unknown required feature, a dataset whose checksum, shape or content is wrong
-/// (named).
+/// belongs to no contour; lengths of points that the file does not state are shares of their contour's.
+/// Errors: not a map file, another major version or unit, an unknown required feature, a dataset whose
+/// checksum, shape or content is wrong (named).
 Expected<ContourMap> read_map_h5(const std::string& path);
 
 /// Where a map lies in the world.

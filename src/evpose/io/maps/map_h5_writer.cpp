@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "evpose/core/version.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/files/crc32.h"
 #include "evpose/io/hdf5/hdf5_file.h"
+#include "evpose/io/maps/map_columns.h"
 #include "evpose/io/maps/map_h5.h"
 #include "evpose/io/maps/map_h5_meta.h"
+#include "evpose/io/maps/map_h5_pages.h"
 
 namespace evpose {
 namespace {
@@ -24,7 +28,7 @@ struct Columns {
   std::vector<std::int32_t> plane_a, plane_b;
   std::vector<float> length, sigma;
   std::vector<std::int8_t> contrast_sign;
-  std::vector<float> xyz, tangent, normal_a, normal_b, point_sigma;
+  std::vector<float> xyz, tangent, normal_a, normal_b, point_length, point_sigma;
 };
 
 /// Points of a contour together, contours in the order of their first points.
@@ -73,15 +77,52 @@ Columns columns_of(const ContourMap& map) {
     append(c.tangent, p.tangent);
     append(c.normal_a, p.normal);
     append(c.normal_b, p.normal_b);
+    c.point_length.push_back(p.length);
     c.point_sigma.push_back(p.sigma);
     before = &p;
   }
   return c;
 }
 
+/// The horizontal rectangle around what a page holds.
+void set_box(const ContourMap& map, const MapPage& begin, const MapPage& end, MapFilePage& page) {
+  Eigen::AlignedBox2f box;
+  for (std::uint32_t i = begin.points_end; i < end.points_end; ++i)
+    box.extend(map.points[i].position.head<2>());
+  for (std::uint32_t i = begin.polygons_end; i < end.polygons_end; ++i)
+    for (const auto& v : map.polygons[i].vertices) box.extend(v.head<2>());
+  if (box.isEmpty()) return;
+  page.low = box.min();
+  page.high = box.max();
+}
+
+/// The rows of the map's pages; none if the map is not divided, or so changed that its pages are not in
+/// order.
+std::vector<MapFilePage> pages_of(const ContourMap& map, const Columns& c) {
+  std::vector<MapFilePage> out;
+  const std::vector<std::size_t> order = grouped(map);
+  const bool in_order = std::is_sorted(order.begin(), order.end());
+  if (map.pages.size() < 2 || map.polygons.empty() || !in_order ||
+      map.pages.back().points_end != map.points.size())
+    return out;
+  std::uint64_t contours = 0, polygons = 0, vertices = 0;
+  MapPage begin;
+  for (const MapPage& end : map.pages) {
+    MapFilePage page;
+    if (!out.empty()) page.first = out.back().end;
+    while (contours < c.start.size() && c.start[contours] < end.points_end) ++contours;
+    for (; polygons < end.polygons_end; ++polygons) vertices += map.polygons[polygons].vertices.size();
+    page.end = {end.points_end, contours, end.planes_end, polygons, vertices};
+    set_box(map, begin, end, page);
+    out.push_back(page);
+    begin = end;
+  }
+  return out;
+}
+
 class Writer {
  public:
-  explicit Writer(Hdf5File file) : file_(std::move(file)) {}
+  Writer(Hdf5File file, std::vector<MapFilePage> pages) : file_(std::move(file)), pages_(std::move(pages)) {}
 
   template <class T>
   Status dataset(const std::string& name, NumberType type, const std::vector<T>& values,
@@ -92,6 +133,11 @@ class Writer {
     auto made = file_.make_dataset(name, type, shape, std::clamp<std::uint64_t>(rows, 1, kChunkRows));
     if (!made) return made.error();
     if (auto status = file_.append(*made, type, 0, rows, values.data()); !status) return status;
+    for (MapFilePage& page : pages_) {
+      const MapRows kind = rows_of_dataset(name);
+      page.crc += page_checksum(name, values.data() + page.first_of(kind) * width,
+                                page.count_of(kind) * width * sizeof(T));
+    }
     const std::uint32_t crc = crc32(values.data(), values.size() * sizeof(T));
     return file_.set_attribute(name, "crc32", NumberType::u32, {}, &crc);
   }
@@ -100,11 +146,13 @@ class Writer {
   Status planes(const std::vector<MapPlane>& planes);
   Status polygons(const std::vector<MapPolygon>& polygons);
   Status mesh(const TriangleMesh& mesh);
+  Status pages();
   Status meta(const ContourMap& map, const std::string& created_utc, const MapPlacement& placement);
   Status close();
 
  private:
   Hdf5File file_;
+  std::vector<MapFilePage> pages_;  ///< with the checksums of what has been written
 };
 
 /// The first failure of a list of steps.
@@ -128,6 +176,7 @@ Status Writer::contours(const Columns& c) {
                         dataset("/points/tangent", NumberType::f32, c.tangent, 3),
                         dataset("/points/normal_a", NumberType::f32, c.normal_a, 3),
                         dataset("/points/normal_b", NumberType::f32, c.normal_b, 3),
+                        dataset("/points/length", NumberType::f32, c.point_length),
                         dataset("/points/sigma", NumberType::f32, c.point_sigma)});
 }
 
@@ -180,6 +229,26 @@ Status Writer::mesh(const TriangleMesh& mesh) {
                         dataset("/mesh/triangles", NumberType::u32, triangles, 3)});
 }
 
+/// After all else.
+Status Writer::pages() {
+  const std::vector<MapFilePage> pages = std::exchange(pages_, {});
+  if (pages.empty()) return {};
+  std::vector<std::uint32_t> crc;
+  std::vector<float> box;
+  for (const MapFilePage& page : pages) {
+    crc.push_back(page.crc);
+    box.insert(box.end(), {page.low.x(), page.low.y(), page.high.x(), page.high.y()});
+  }
+  Status done = first_failure({file_.make_group("/pages"), dataset("/pages/crc32", NumberType::u32, crc),
+                               dataset("/pages/box", NumberType::f32, box, 4)});
+  for (std::size_t k = 0; k < kMapRowNames.size() && done; ++k) {
+    std::vector<std::uint64_t> ends;
+    for (const MapFilePage& page : pages) ends.push_back(page.end[k]);
+    done = dataset(text("/pages/", kMapRowNames[k], "_end"), NumberType::u64, ends);
+  }
+  return done;
+}
+
 Status Writer::meta(const ContourMap& map, const std::string& created_utc, const MapPlacement& placement) {
   const std::uint32_t major = 1, minor = 0;
   std::array<double, 16> T_ned_map = kNedFromEnu;
@@ -228,11 +297,12 @@ Status write_map_h5(const std::string& path, const ContourMap& map, const std::s
   if (!temporary) return temporary.error();
   auto file = Hdf5File::create(*temporary);
   if (!file) return file.error();
-  Writer writer(*std::move(file));
-  if (auto status = first_failure({writer.contours(columns_of(map)), writer.planes(map.planes),
-                                   writer.polygons(map.polygons),
-                                   map.polygons.empty() ? writer.mesh(map.occluders) : Status(),
-                                   writer.meta(map, created_utc, placement), writer.close()});
+  const Columns columns = columns_of(map);
+  Writer writer(*std::move(file), pages_of(map, columns));
+  if (auto status =
+          first_failure({writer.contours(columns), writer.planes(map.planes), writer.polygons(map.polygons),
+                         map.polygons.empty() ? writer.mesh(map.occluders) : Status(), writer.pages(),
+                         writer.meta(map, created_utc, placement), writer.close()});
       !status)
     return status;
   return temporary->commit();

@@ -270,9 +270,7 @@ Expected<std::string> read_rest(const std::string& path, std::int64_t offset) {
   return data;
 }
 
-}  // namespace
-
-Expected<PointTable> read_pcd(const std::string& path) {
+Expected<PointTable> read_all_rows(const std::string& path) {
   auto lines = LineReader::open(path);
   if (!lines) return lines.error();
   const auto header = read_header(*lines, path);
@@ -292,8 +290,20 @@ Expected<PointTable> read_pcd(const std::string& path) {
                  "use ascii, binary or binary_compressed"};
   }
   if (!status) return status.error();
-  drop_absent(path, table);
   return table;
+}
+
+}  // namespace
+
+Expected<PointTable> read_pcd(const std::string& path) {
+  auto table = read_all_rows(path);
+  if (table) drop_absent(path, *table);
+  return table;
+}
+
+Status visit_pcd(const std::string& path, const PointBlocks& visit) {
+  const auto table = read_all_rows(path);
+  return table ? visit(*table) : Status(table.error());
 }
 
 }  // namespace evpose

@@ -76,27 +76,35 @@ std::string properties(const std::string& type, std::initializer_list<const char
 
 }  // namespace
 
-Expected<PointTable> read_ply_vertices(const std::string& path) {
+Status visit_ply_vertices(const std::string& path, const PointBlocks& visit) {
   auto file = PlyFile::open(path);
   if (!file) return file.error();
-  PointTable table;
+  PointTable block;
   for (const PlyElement& element : file->elements()) {
     if (element.name != "vertex") continue;
-    if (!table.names.empty()) return Error{path, "element 'vertex' stands twice", "write one"};
+    if (!block.names.empty()) return Error{path, "element 'vertex' stands twice", "write one"};
     for (const auto& property : element.properties)
-      if (!property.count_type) table.names.push_back(property.name);
-    table.columns.resize(table.names.size());
-    for (auto& column : table.columns) column.reserve(element.count);
+      if (!property.count_type) block.names.push_back(property.name);
+    block.columns.resize(block.names.size());
   }
-  if (table.names.empty()) return Error{path, "no element 'vertex' with numbers", "is it a point cloud?"};
-  const auto visit = [&](const PlyElement& element, std::uint64_t, const std::vector<double>& values,
-                         const Lists&) {
-    if (element.name == "vertex")
-      for (std::size_t k = 0; k < values.size(); ++k) table.columns[k].push_back(values[k]);
-    return Status();
+  if (block.names.empty()) return Error{path, "no element 'vertex' with numbers", "is it a point cloud?"};
+  const auto hand_on = [&] {
+    Status done = visit(block);
+    for (auto& column : block.columns) column.clear();
+    return done;
   };
-  if (auto status = read_rows(*file, visit); !status) return status.error();
-  return table;
+  const auto row = [&](const PlyElement& element, std::uint64_t, const std::vector<double>& values,
+                       const Lists&) {
+    if (element.name != "vertex") return Status();
+    for (std::size_t k = 0; k < values.size(); ++k) block.columns[k].push_back(values[k]);
+    return block.rows() < kPointBlock ? Status() : hand_on();
+  };
+  if (auto status = read_rows(*file, row); !status) return status;
+  return hand_on();
+}
+
+Expected<PointTable> read_ply_vertices(const std::string& path) {
+  return joined_blocks([&](const PointBlocks& visit) { return visit_ply_vertices(path, visit); });
 }
 
 Expected<std::vector<Eigen::Vector3d>> read_ply_points(const std::string& path) {

@@ -18,6 +18,8 @@ namespace evpose {
 /// line of the header or of the ascii data, or the bytes expected and found. Zero vertices are not an error
 /// here.
 Expected<PointTable> read_ply_vertices(const std::string& path);
+/// The same in blocks, so that the memory does not grow with the file.
+Status visit_ply_vertices(const std::string& path, const PointBlocks& visit);
 
 /// x y z of each vertex, metres. Errors: not finite (vertex number).
 Expected<std::vector<Eigen::Vector3d>> read_ply_points(const std::string& path);

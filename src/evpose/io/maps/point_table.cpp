@@ -17,4 +17,18 @@ Expected<PointFileKind> point_file_kind(const std::string& path) {
   return PointFileKind::other;
 }
 
+Expected<PointTable> joined_blocks(const std::function<Status(const PointBlocks&)>& read) {
+  PointTable all;
+  const Status done = read([&](const PointTable& block) {
+    all.names = block.names;
+    all.viewpoint = block.viewpoint;
+    all.columns.resize(block.columns.size());
+    for (std::size_t k = 0; k < block.columns.size(); ++k)
+      all.columns[k].insert(all.columns[k].end(), block.columns[k].begin(), block.columns[k].end());
+    return Status();
+  });
+  if (!done) return done.error();
+  return all;
+}
+
 }  // namespace evpose

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,5 +32,13 @@ struct PointTable {
     return nullptr;
   }
 };
+
+/// Is given the rows of a file in order, a block at a time, the first of which may be empty. An error ends
+/// the reading and becomes its own.
+using PointBlocks = std::function<Status(const PointTable& block)>;
+inline constexpr std::size_t kPointBlock = 65536;  ///< rows of a block at the most
+
+/// All blocks that `read` gives as one table.
+Expected<PointTable> joined_blocks(const std::function<Status(const PointBlocks&)>& read);
 
 }  // namespace evpose

@@ -103,6 +103,7 @@ class Tracker {
   void prepare_update();
   FusionState forecast() const;
   void see_contours(double span_s);
+  void project_samples(const FusionState& state, double span_s);
   TimeNs imu_time(TimeNs t) const;  ///< of an instant of the camera's clock
 
   // The stages of an update.

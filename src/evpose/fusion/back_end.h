@@ -55,6 +55,9 @@ class BackEnd {
   virtual void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) = 0;
   void update(const PoseInformation& measurement) { update(measurement, {}); }
   virtual bool takes_contours() const { return false; }
+  /// Where a segment of the map is known to stand, from where the map has it; map frame, m. Contours are to
+  /// be measured there.
+  virtual Eigen::Vector3d displacement_of(std::uint32_t /*segment*/) const { return Eigen::Vector3d::Zero(); }
   /// The newest state, with its covariance. A copy can be carried to any later time by propagator().
   virtual const FusionState& state() const = 0;
   /// The same with the covariance that is reported: with what the framework knows to be uncertain beside what

@@ -76,18 +76,17 @@ void Ekf::add_contours(std::span<const ContourOffset> contours) {
   std::array<BlockRow, 2> rows;
   for (const ContourOffset& contour : contours) {
     std::size_t n = 0;
-    double residual = contour.offset_px;
     if (offsets_)
-      if (const auto effect = offsets_->effect(contour, filter_)) {
-        rows[n++] = effect->row;
-        residual -= effect->present_px;
-      }
+      if (const auto row = offsets_->row_of(contour, filter_)) rows[n++] = *row;
     if (const auto row = calibration_.row_of(contour)) rows[n++] = *row;
-    const BlockSample sample{
-        contour.by_pose(R), contour.weight, residual, contour.offset_px, {rows.data(), n}};
+    const BlockSample sample{contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}};
     if (n > 0) measurement_.add(sample);
     SharedErrors::add(contour, sample, measurement_);
   }
+}
+
+Eigen::Vector3d Ekf::displacement_of(std::uint32_t segment) const {
+  return offsets_ ? offsets_->displacement_of(segment) : Eigen::Vector3d::Zero();
 }
 
 Matrix6d Ekf::measured_covariance() const {

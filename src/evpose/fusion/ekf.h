@@ -27,6 +27,7 @@ class Ekf : public BackEnd {
   void update(const SeenMeasurement& measurement) override;
   Eigen::MatrixXd seen_covariance() const override;
   bool takes_contours() const override { return true; }
+  Eigen::Vector3d displacement_of(std::uint32_t segment) const override;
   const FusionState& state() const override { return filter_.state(); }
   FusionState reported_state() const override;
   Matrix6d measured_covariance() const override;

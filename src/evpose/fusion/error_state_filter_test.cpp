@@ -59,10 +59,10 @@ ImuSample reading(TimeNs t) {
           {1.5 * std::sin(4 * s), 1.2, 9.81 + std::cos(6 * s)}};
 }
 
-/// A sample as the tests draw it, with what the registration had taken its residual for.
+/// A sample as the tests draw it.
 struct Sample {
   Vector6d by_pose;
-  double weight, residual, residual_in_pose;
+  double weight, residual;
   std::vector<BlockRow> rows;
 };
 
@@ -71,10 +71,9 @@ std::vector<Sample> draw_samples(Draw& draw, int count, const std::vector<std::p
   std::vector<Sample> out;
   for (int i = 0; i < count; ++i) {
     const Eigen::VectorXd by_pose = 200 * draw.vector(6);
-    Sample s{by_pose, 4 + std::abs(draw.number()), size * draw.number(), size * draw.number(), {}};
+    Sample s{by_pose, 4 + std::abs(draw.number()), size * draw.number(), {}};
     for (const auto& [id, n] : blocks)
       if (i < n || draw.with(0.7)) s.rows.push_back({id, 200 * draw.matrix(1, n)});
-    if (s.rows.empty()) s.residual_in_pose = s.residual;
     out.push_back(s);
   }
   return out;
@@ -84,12 +83,12 @@ JointMeasurement joined(const std::vector<Sample>& samples, std::span<const Pose
   PoseInformation pose;
   for (const Sample& s : samples) {
     pose.information += s.weight * s.by_pose * s.by_pose.transpose();
-    pose.vector += s.weight * s.residual_in_pose * s.by_pose;
+    pose.vector += s.weight * s.residual * s.by_pose;
   }
   JointMeasurement out;
   out.start(pose, shifts);
   for (const Sample& s : samples)
-    if (!s.rows.empty()) out.add({s.by_pose, s.weight, s.residual, s.residual_in_pose, s.rows});
+    if (!s.rows.empty()) out.add({s.by_pose, s.weight, s.residual, s.rows});
   return out;
 }
 
@@ -384,12 +383,11 @@ struct Flown {
       samples[i].residual = samples[i].by_pose.dot(seen) + share * px[i];
       for (const BlockRow& row : samples[i].rows)
         samples[i].residual -= row.by_block.dot(values.segment(filter.at(row.block), row.by_block.size()));
-      samples[i].residual_in_pose = samples[i].residual;
     }
     JointMeasurement m = joined(samples, {&mixed.shift, 1});
     m.expect_shared_errors(1);
     for (std::size_t i = 0; i < samples.size(); ++i)
-      m.add_shared_error(0, px[i], {samples[i].by_pose, samples[i].weight, 0, 0, samples[i].rows});
+      m.add_shared_error(0, px[i], {samples[i].by_pose, samples[i].weight, 0, samples[i].rows});
     filter.update(m);
     for (const BlockId id : {mixed.shifting, mixed.sampled, mixed.offset})
       values.segment(filter.at(id), filter.covariance(id).rows()) += filter.correction(id);

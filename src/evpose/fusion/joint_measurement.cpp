@@ -53,7 +53,6 @@ int JointMeasurement::place_of(BlockId id, int size) {
 }
 
 void JointMeasurement::add(const BlockSample& s) {
-  vector_.head<6>() += s.weight * (s.residual - s.residual_in_pose) * s.by_pose;
   for (const BlockRow& row : s.rows) {
     const auto n = static_cast<int>(row.by_block.size());
     const Block here = blocks_[static_cast<std::size_t>(place_of(row.block, n))];

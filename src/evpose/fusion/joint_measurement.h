@@ -30,8 +30,7 @@ struct BlockRow {
 struct BlockSample {
   Vector6d by_pose;
   double weight = 0;
-  double residual = 0;          ///< at the present value of the blocks
-  double residual_in_pose = 0;  ///< the value that the pose's information vector holds
+  double residual = 0;  ///< at the present value of the blocks, as the pose's information vector holds it
   std::span<const BlockRow> rows;
 };
 
@@ -44,8 +43,8 @@ class JointMeasurement {
  public:
   /// Begins anew with what the registration summed up for the pose, over all samples.
   void start(const PoseInformation& pose, std::span<const PoseShift> shifts = {});
-  /// Adds what a sample says about blocks. Its share of the pose's own information is in there already; its
-  /// share of the pose's vector is corrected for the difference of the two residuals.
+  /// Adds what a sample says about blocks. Its share of the pose's own information and vector is in there
+  /// already.
   void add(const BlockSample& sample);
 
   /// Adds what is known of one block together with the pose: information and vector of both, the pose first.

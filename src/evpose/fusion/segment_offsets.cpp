@@ -41,17 +41,20 @@ SegmentOffsets::Segment* SegmentOffsets::find_or_add(const ContourOffset& contou
   return &segments_[place];
 }
 
-std::optional<SegmentOffsets::Effect> SegmentOffsets::effect(const ContourOffset& contour,
-                                                             ErrorStateFilter& filter) {
+std::optional<BlockRow> SegmentOffsets::row_of(const ContourOffset& contour, ErrorStateFilter& filter) {
   const Eigen::Vector3d across = filter.state().nav.T_map_body.rotation() * contour.across_body;
   const double length = across.norm();
   const Segment* segment = length > 0 ? find_or_add(contour, across / length, filter) : nullptr;
   if (segment == nullptr) return std::nullopt;
-  // The contour's point moves against the pose and with the segment. The registration has it at the map's
-  // place, the filter where the segment is known to be.
-  const double by_offset = -across.dot(segment->across_map);
-  return Effect{{segment->block, BlockRow::Derivative::Constant(1, by_offset)},
-                by_offset * segment->offset_m};
+  // The contour's point moves against the pose and with the segment.
+  return BlockRow{segment->block, BlockRow::Derivative::Constant(1, -across.dot(segment->across_map))};
+}
+
+Eigen::Vector3d SegmentOffsets::displacement_of(std::uint32_t segment) const {
+  const auto known = place_of_number_.find(segment);
+  if (known == place_of_number_.end()) return Eigen::Vector3d::Zero();
+  const Segment& found = segments_[known->second];
+  return found.offset_m * found.across_map;
 }
 
 void SegmentOffsets::apply_corrections(const ErrorStateFilter& filter) {

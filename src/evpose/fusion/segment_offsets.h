@@ -22,13 +22,12 @@ class SegmentOffsets {
   explicit SegmentOffsets(const SegmentOffsetConfig& config) : config_(config) {}
 
   void remove_all(ErrorStateFilter& filter);
-  /// How a contour's residual depends on the offset of its segment.
-  struct Effect {
-    BlockRow row;
-    double present_px;  ///< the part that the segment's present offset explains
-  };
-  /// A segment that is seen for the first time becomes a state. None: there is no state for it.
-  std::optional<Effect> effect(const ContourOffset& contour, ErrorStateFilter& filter);
+  /// How a contour's residual, measured where the segment is known to stand, depends on the error of the
+  /// segment's offset. A segment that is seen for the first time becomes a state. None: there is no state for
+  /// it.
+  std::optional<BlockRow> row_of(const ContourOffset& contour, ErrorStateFilter& filter);
+  /// From where the map has the segment, map frame.
+  Eigen::Vector3d displacement_of(std::uint32_t segment) const;
   /// Takes over what the filter's last update found.
   void apply_corrections(const ErrorStateFilter& filter);
 

@@ -54,6 +54,12 @@ Vector6d by_pose(const ContourOffset& contour, const Pose& at) {
   return J;
 }
 
+/// What the present offset of the contour's segment makes up of its distance in the image.
+double known_px(const BackEnd& filter, const ContourOffset& contour) {
+  const Eigen::Vector3d across_map = filter.state().nav.T_map_body.rotation() * contour.across_body;
+  return across_map.dot(filter.displacement_of(contour.segment));
+}
+
 /// The sum over the contours, as a registration makes it.
 PoseInformation summed(const std::vector<ContourOffset>& contours, const Pose& at) {
   PoseInformation sum;
@@ -93,8 +99,9 @@ TEST(SegmentOffsets, RepeatedMeasurementsGiveTheBatchSolutionOverPoseAndOffsets)
       row(6 + contour.segment / 10) = -contour.across_body.norm();
       information += contour.weight * row * row.transpose();
       vector += contour.weight * asked * row;
-      // The filter is told from where it stands.
-      contour.offset_px = asked - row.head<6>().dot(filter.state().nav.T_map_body.minus(first));
+      // The filter is told from where it stands, and its segments are known to stand.
+      contour.offset_px =
+          asked - row.head<6>().dot(filter.state().nav.T_map_body.minus(first)) + known_px(filter, contour);
     }
     measure(filter, contours);
   }
@@ -141,7 +148,7 @@ TEST(SegmentOffsets, AMapThatIsOffTellsNoMoreThanItsSegmentsAllow) {
         for (ContourOffset& contour : contours)
           contour.offset_px = by_pose(contour, filter->state().nav.T_map_body).dot(wrong) -
                               contour.across_body.norm() * offsets[contour.segment / 10] +
-                              normal(random) / std::sqrt(contour.weight);
+                              known_px(*filter, contour) + normal(random) / std::sqrt(contour.weight);
         measure(*filter, contours);
       }
     const auto nees = [](const BackEnd& filter) {

@@ -9,12 +9,14 @@
 
 #include "evpose/map_build/median.h"
 #include "evpose/map_build/moments.h"
+#include "evpose/map_build/plane_split.h"
 
 namespace evpose::map_build {
 namespace {
 
 constexpr double kFewestPoints = 40;  // of a plane, however small the patches
 constexpr double kInnerShare = 0.2;   // of a plane's points, that lie away from other planes
+constexpr double kParallel = 0.98;    // cosine of the angle between two layers of a surface
 constexpr double kBendNoise = 1.2;    // rms distance from the planes beside it, in units of the noise
 
 struct Fit {
@@ -49,6 +51,7 @@ class RegionGrowing {
   void dissolve_bends();
   void merge_coplanar();
   void adopt_bends();
+  void split_layers();
   void relabel_to_nearest();
   void refit();
   Planes result();
@@ -250,11 +253,23 @@ void RegionGrowing::relabel_to_nearest() {
     for (int k = 0; k < SurfacePoints::kLinks; ++k) {
       const std::int32_t other = label_[links(i)[k]];
       if (other < 0 || other == nearest[i]) continue;
+      // Of two layers the noise takes points to the wrong one.
+      if (std::abs(planes[static_cast<std::size_t>(other)].normal.dot(
+              planes[static_cast<std::size_t>(label_[i])].normal)) > kParallel)
+        continue;
       const double distance = std::abs(planes[static_cast<std::size_t>(other)].distance(at(i)));
       if (distance < least) least = distance, nearest[i] = other;
     }
   }
   label_ = std::move(nearest);
+}
+
+void RegionGrowing::split_layers() {
+  const std::int32_t count =
+      split_layered_planes(surface_, least_points_, static_cast<std::int32_t>(moments_.size()), label_);
+  moments_.assign(static_cast<std::size_t>(count), {});
+  for (std::uint32_t i = 0; i < label_.size(); ++i)
+    if (label_[i] >= 0) moments_[static_cast<std::size_t>(label_[i])].add(at(i));
 }
 
 /// Planes through the points that have only points of the same plane around them. Beside a bend the noise
@@ -341,6 +356,7 @@ Planes find_planes(const SurfacePoints& surface, const PlaneConfig& config) {
   growing.dissolve_bends();
   growing.merge_coplanar();
   growing.adopt_bends();
+  growing.split_layers();
   for (int round = 0; round < 3; ++round) {
     growing.refit();
     growing.relabel_to_nearest();

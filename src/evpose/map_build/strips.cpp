@@ -17,6 +17,7 @@ constexpr double kWidthSpacings = 3;  // width of a strip
 constexpr double kLeastWidth_m = 0.04;
 constexpr double kWindow = 2.5;       // noise: half width of the window that follows the height
 constexpr double kFurthest = 4;       // noise: heights that are looked at to begin with
+constexpr double kCollected = 8;      // noise: heights that the window may come to and see whole
 constexpr double kOffPlane = 0.2;     // share of faces that leave their plane beside an edge
 constexpr double kOffPlane_m = 0.02;  // by how much such faces leave their plane, 1 sigma
 constexpr double kUneven = 0.1;       // noise: so far a surface may leave its plane unnoticed
@@ -83,7 +84,7 @@ void fit_slope(const std::vector<std::pair<double, double>>& points, double leng
 }  // namespace
 
 double strip_reach_m(double noise_m, double sine, double spacing_m) {
-  return kMixed * noise_m / std::max(sine, 0.3) + width_m(spacing_m) + kFurthest * noise_m;
+  return kMixed * noise_m / std::max(sine, 0.3) + width_m(spacing_m) + kCollected * noise_m;
 }
 
 std::vector<Eigen::Vector3d> points_around(const SurfacePoints& surface, const Neighbours& tree,
@@ -109,7 +110,7 @@ StripFit fit_strip(const std::vector<Eigen::Vector3d>& around, const StripPlace&
     if (s < gap || s > far) continue;
     if (std::abs(place.other.distance(x)) < kMixed * noise_m) continue;
     const double height = plane.distance(x);
-    if (std::abs(height) <= kFurthest * noise_m) points.emplace_back(along.dot(x - middle), height);
+    if (std::abs(height) <= kCollected * noise_m) points.emplace_back(along.dot(x - middle), height);
   }
   const double prior = std::hypot(plane.sigma_at(middle), std::max(kUneven * noise_m, plane.uneven_m));
   StripFit out;

@@ -62,21 +62,22 @@ EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConf
     : size_(size),
       config_(config),
       index_(size, kHalfLength_px, kAmbiguity_px),
-      contrast_(segments, config.contrast_threshold) {}
+      contrast_(segments, config.contrast_threshold),
+      trust_(config.judge_contours ? segments : 0) {}
 
 double EventRegistration::Concentration::value() const {
-  return weight > 0 ? std::clamp((inside - at_gate) / weight, kLeastConcentration, 1.0) : 1;
+  return sums.weight > 0 ? std::clamp(sums.slope(), kLeastConcentration, 1.0) : 1;
 }
 
 void EventRegistration::Concentration::decay(double span_s) {
-  const double keep = std::clamp(2 * kEnoughWeight / std::max(weight, 1e-9), std::exp(-span_s / kMemory_s),
-                                 std::exp(-span_s / kLongestMemory_s));
-  weight *= keep, inside *= keep, at_gate *= keep;
+  const double keep = std::clamp(2 * kEnoughWeight / std::max(sums.weight, 1e-9),
+                                 std::exp(-span_s / kMemory_s), std::exp(-span_s / kLongestMemory_s));
+  sums *= keep;
 }
 
 /// Events spread evenly over the gates do not tell of contours: the pose is not where it is thought to be.
 bool EventRegistration::consistent() const {
-  return concentration_.weight < kEnoughWeight || concentration_.value() >= kConsistent;
+  return concentration_.sums.weight < kEnoughWeight || concentration_.value() >= kConsistent;
 }
 
 bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) const {
@@ -169,10 +170,10 @@ void EventRegistration::add_event(std::int32_t band, float d, Sum* sum) {
   sum->offset += w * d;
   sum->square += w * d * d;
   ++sum->events;
-  concentration_.weight += w;
-  concentration_.inside += w + 2 * w * (1 - w) * d * d * line.exponent;
-  if (std::abs(d) > kGateRim * line.gate)
-    concentration_.at_gate += w * std::abs(d) / ((1 - kGateRim) * line.gate);
+  GateSums gate{w, w + 2 * w * (1 - w) * d * d * line.exponent, 0};
+  if (std::abs(d) > kGateRim * line.gate) gate.at_gate = w * std::abs(d) / ((1 - kGateRim) * line.gate);
+  sum->gate += gate;
+  concentration_.sums += gate;
 }
 
 void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationResult* result) {
@@ -207,6 +208,13 @@ void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationRes
     set_verdict(line.wrong_on || line.wrong_off ? EventVerdict::predicted : EventVerdict::contour);
     add_event(owner.band, d, &sum);
   }
+}
+
+/// What the events say of the contours one by one.
+void EventRegistration::judge_contours(const RegistrationProblem& p) {
+  trust_.advance(p.span_s);
+  for (std::size_t i = 0; i < p.samples.size(); ++i)
+    if (sums_[i].events > 0) trust_.add(p.samples[i].segment, sums_[i].gate);
 }
 
 /// Whether the sample's band owns one probe position in it, a different one at every call.
@@ -296,7 +304,9 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
     const double own = event_variance / c.weight;
     const double shared =
         repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px + c.map_variance / c.weight);
-    const double scale = c.trust * own / (own + shared) / event_variance;
+    const double borne_out =
+        config_.judge_contours ? trust_.trust(p.samples[i].segment, concentration_.value()) : 1;
+    const double scale = borne_out * c.trust * own / (own + shared) / event_variance;
     if (c.trust < 0.5) result->other_motion += sum.events;
     const Vector6d& J = p.samples[i].jacobian;
     result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * correction * sum.weight);
@@ -325,6 +335,7 @@ RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   make_lines(p);
   sum_events(p, &result);
   learn_contrast(p);
+  if (config_.judge_contours) judge_contours(p);
   number_clusters(p);
   if (config_.ego_motion_test) test_ego_motion(p);
   sum_clusters(p);
@@ -333,7 +344,7 @@ RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   for (std::size_t i = 0; i < p.samples.size(); ++i)
     if (sums_[i].events > 0) clusters_[cluster_numbers_[i]] = {};
   result.points = static_cast<int>(p.samples.size());
-  result.gate_concentration = concentration_.weight < kEnoughWeight ? 0 : concentration_.value();
+  result.gate_concentration = concentration_.sums.weight < kEnoughWeight ? 0 : concentration_.value();
   result.consistent = consistent();
   return result;
 }

@@ -10,6 +10,7 @@
 #include "evpose/core/pose.h"
 #include "evpose/event/event_preprocessor.h"
 #include "evpose/registration/association_band.h"
+#include "evpose/registration/contour_trust.h"
 #include "evpose/registration/contrast_memory.h"
 #include "evpose/registration/flow_monitor.h"
 #include "evpose/registration/registration.h"
@@ -33,6 +34,7 @@ struct EventRegistrationConfig {
   // Not for users: the relocalizer's stages differ in these.
   double contrast_band_px = 1.5;           ///< events so near teach the contrast
   bool gate_truncation_correction = true;  ///< take off the information that the gate hides
+  bool judge_contours = false;  ///< some may be wrong: those that events do not gather at lose weight
 };
 void describe(ConfigTable& table, EventRegistrationConfig& config);
 
@@ -77,13 +79,14 @@ class EventRegistration final : public Registration {
   };
   struct Sum {
     double weight = 0, offset = 0, square = 0;
+    GateSums gate;
     int events = 0, net = 0;    ///< net: events near by, for the contrast
     int agree = 0, differ = 0;  ///< events in the gate that move as predicted, or not
   };
   /// Derivative of the mean distance by an offset, from sums over events with exponential forgetting: 1 for
   /// events that all lie near the contours, 0 for events spread evenly over the gates.
   struct Concentration {
-    double weight = 0, inside = 0, at_gate = 0;
+    GateSums sums;
     double value() const;
     void decay(double span_s);
   };
@@ -97,6 +100,7 @@ class EventRegistration final : public Registration {
   void sum_events(const RegistrationProblem& problem, RegistrationResult* result);
   void add_event(std::int32_t band, float distance, Sum* sum);
   void learn_contrast(const RegistrationProblem& problem);
+  void judge_contours(const RegistrationProblem& problem);
   void number_clusters(const RegistrationProblem& problem);
   void test_ego_motion(const RegistrationProblem& problem);
   void sum_clusters(const RegistrationProblem& problem);
@@ -112,6 +116,7 @@ class EventRegistration final : public Registration {
   AssociationIndex index_;
   ContrastMemory contrast_;
   FlowMonitor flow_;
+  ContourTrust trust_;
   Concentration concentration_;
   // Of the last call, one for each sample; kept so that steady state allocates nothing.
   std::vector<AssociationBand> bands_;

@@ -26,6 +26,15 @@ class ContourSelection {
   void choose(const Pose& T_map_body) { visible_.choose(T_map_body * T_body_cam_); }
   /// Projects the chosen points at this state over the last `span_s`.
   void project(const FusionState& state, double span_s);
+  /// Moves the samples that project() made to where their contours are known to stand: each by
+  /// `displacement_of(its point)`, map frame, m.
+  template <class DisplacementOf>
+  void displace(const DisplacementOf& displacement_of) {
+    for (ContourSample& s : samples_) {
+      const Eigen::Vector3d displacement = displacement_of(s.point);
+      s.pixel += s.jacobian.head<3>().dot(displacement) * s.normal_px;
+    }
+  }
   /// By how much samples would move across their contours if the pose changed by this, px; the largest.
   double largest_shift_px(const Vector6d& pose_change) const;
 

@@ -160,7 +160,7 @@ void Tracker::prepare_update() {
   if (update_number_ > 0 && !supervisor_.searching() && !start_alignment_) {
     const FusionState coming = forecast();
     const double span_s = to_seconds(next_update_ - last_update_);
-    contours_.project(coming, span_s);
+    project_samples(coming, span_s);
     if (registration_->expect({contours_.samples(), span_s}, &interest_)) forecast_ = coming.nav;
   }
   looks_aside_ = next_update_ >= last_look_aside_ + kLookAside;
@@ -190,7 +190,15 @@ void Tracker::see_contours(double span_s) {
     if (contours_.largest_shift_px(change) < kForecastHolds_px) return;
   }
   forecast_.reset();
+  project_samples(state, span_s);
+}
+
+/// Where the map has them, or where their segments are known to stand.
+void Tracker::project_samples(const FusionState& state, double span_s) {
   contours_.project(state, span_s);
+  if (!offset_segments_.empty())
+    contours_.displace(
+        [this](std::uint32_t point) { return fusion_->displacement_of(offset_segments_[point]); });
 }
 
 Update Tracker::update(TimeNs t) {

@@ -112,6 +112,7 @@ class Tracker {
   void page_map();
   FusionState forecast() const;
   void see_contours(double span_s);
+  void project_samples(const FusionState& state, double span_s);
   TimeNs imu_time(TimeNs t) const;  ///< of an instant of the camera's clock
 
   // The stages of an update.

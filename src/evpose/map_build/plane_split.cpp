@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/map_build/plane_split.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "evpose/map_build/median.h"
+#include "evpose/map_build/moments.h"
+
+namespace evpose::map_build {
+namespace {
+
+constexpr double kCellPoints = 20;   // about so many in a cell
+constexpr double kFewestInCell = 8;  // below, a cell says nothing
+constexpr double kFewestCells = 9;   // of a part that becomes a plane
+constexpr double kStandsOff = 3;     // sigma of a cell's mean: from which on it is of another surface
+constexpr double kUneven_m = 4e-3;   // by which surfaces are uneven and still one
+constexpr double kFirstWidth = 1.5, kLastWidth = 0.4;  // noise: of the weights of the larger surface's fit
+constexpr int kRounds = 12;
+
+struct Cell {
+  double count = 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  ///< along the plane's two axes, and over it
+  std::vector<std::uint32_t> points;
+  Eigen::Vector3d mean() const { return sum / count; }
+};
+
+using Place = std::pair<int, int>;
+
+/// Height over the plane as a + b x + c y.
+using Form = Eigen::Vector3d;
+double off(const Form& form, const Cell& cell) {
+  const Eigen::Vector3d at = cell.mean();
+  return at.z() - form[0] - form[1] * at.x() - form[2] * at.y();
+}
+
+class LayeredPlane {
+ public:
+  LayeredPlane(const SurfacePoints& surface, const std::vector<std::uint32_t>& points);
+  /// Points of the largest part that stands off the larger surface; empty: all lie on one.
+  std::vector<std::uint32_t> largest_part_beside(double least_points) const;
+
+ private:
+  std::optional<Form> larger_surface() const;
+  double sigma_m(const Cell& cell) const { return noise_m_ / std::sqrt(cell.count); }
+
+  double noise_m_;
+  std::map<Place, Cell> cells_;
+};
+
+LayeredPlane::LayeredPlane(const SurfacePoints& surface, const std::vector<std::uint32_t>& points)
+    : noise_m_(surface.scale.noise_m) {
+  Moments moments;
+  std::vector<float> spacing;
+  for (const std::uint32_t i : points) {
+    moments.add(surface.position[i].cast<double>());
+    spacing.push_back(surface.spacing_m[i]);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments.covariance());
+  const Eigen::Vector3d centre = moments.mean();
+  const Eigen::Vector3d u = solver.eigenvectors().col(2), v = solver.eigenvectors().col(1), n = u.cross(v);
+  const double edge_m = std::sqrt(kCellPoints) * static_cast<double>(median(spacing));
+  for (const std::uint32_t i : points) {
+    const Eigen::Vector3d x = surface.position[i].cast<double>() - centre;
+    const Eigen::Vector3d at(u.dot(x), v.dot(x), n.dot(x));
+    Cell& cell = cells_[{static_cast<int>(std::floor(at.x() / edge_m)),
+                         static_cast<int>(std::floor(at.y() / edge_m))}];
+    cell.count += 1;
+    cell.sum += at;
+    cell.points.push_back(i);
+  }
+  std::erase_if(cells_, [](const auto& entry) { return entry.second.count < kFewestInCell; });
+}
+
+/// Weights that fall off ever more narrowly: of two surfaces the fit ends in the larger one.
+std::optional<Form> LayeredPlane::larger_surface() const {
+  Form form = Form::Zero();
+  for (int round = 0; round < kRounds; ++round) {
+    const double width = noise_m_ * kFirstWidth * std::pow(kLastWidth / kFirstWidth, round / (kRounds - 1.0));
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    for (const auto& [place, cell] : cells_) {
+      const double z = off(form, cell) / width;
+      const double weight = cell.count / ((1 + z * z) * (1 + z * z));
+      const Eigen::Vector3d at = cell.mean(), row(1, at.x(), at.y());
+      squares += weight * row * row.transpose();
+      right += weight * at.z() * row;
+    }
+    const Eigen::LDLT<Eigen::Matrix3d> solver(squares);
+    if (solver.info() != Eigen::Success) return {};
+    form = solver.solve(right);
+    if (!form.allFinite()) return {};
+  }
+  return form;
+}
+
+std::vector<std::uint32_t> LayeredPlane::largest_part_beside(double least_points) const {
+  if (static_cast<double>(cells_.size()) < 2 * kFewestCells) return {};
+  const std::optional<Form> form = larger_surface();
+  if (!form) return {};
+  // Cells that stand off on one side and touch.
+  std::map<Place, int> beside;
+  for (const auto& [place, cell] : cells_)
+    if (const double d = off(*form, cell); std::abs(d) > std::hypot(kStandsOff * sigma_m(cell), kUneven_m))
+      beside[place] = d > 0 ? 1 : -1;
+  std::vector<std::uint32_t> largest;
+  while (!beside.empty()) {
+    const int side = beside.begin()->second;
+    std::vector<Place> part{beside.begin()->first};
+    beside.erase(beside.begin());
+    for (std::size_t next = 0; next < part.size(); ++next)
+      for (int dx = -1; dx <= 1; ++dx)
+        for (int dy = -1; dy <= 1; ++dy) {
+          const auto found = beside.find({part[next].first + dx, part[next].second + dy});
+          if (found == beside.end() || found->second != side) continue;
+          part.push_back(found->first);
+          beside.erase(found);
+        }
+    if (static_cast<double>(part.size()) < kFewestCells) continue;
+    std::vector<std::uint32_t> points;
+    for (const Place& place : part) {
+      const Cell& cell = cells_.at(place);
+      points.insert(points.end(), cell.points.begin(), cell.points.end());
+    }
+    if (points.size() > largest.size()) largest = std::move(points);
+  }
+  if (static_cast<double>(largest.size()) < least_points) largest.clear();
+  return largest;
+}
+
+}  // namespace
+
+std::int32_t split_layered_planes(const SurfacePoints& surface, double least_points, std::int32_t planes,
+                                  std::vector<std::int32_t>& label) {
+  std::vector<std::vector<std::uint32_t>> members(static_cast<std::size_t>(planes));
+  for (std::uint32_t i = 0; i < label.size(); ++i)
+    if (label[i] >= 0) members[static_cast<std::size_t>(label[i])].push_back(i);
+  for (std::size_t plane = 0; plane < members.size(); ++plane) {
+    std::vector<std::uint32_t> part = LayeredPlane(surface, members[plane]).largest_part_beside(least_points);
+    if (part.empty()) continue;
+    const auto number = static_cast<std::int32_t>(members.size());
+    for (const std::uint32_t i : part) label[i] = number;
+    std::erase_if(members[plane], [&](std::uint32_t i) { return label[i] == number; });
+    std::sort(part.begin(), part.end());
+    members.push_back(std::move(part));  // which may be layered itself
+    --plane;                             // and so may be the rest
+  }
+  return static_cast<std::int32_t>(members.size());
+}
+
+}  // namespace evpose::map_build

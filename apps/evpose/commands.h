@@ -25,6 +25,7 @@ void add_check(CLI::App& app, std::function<int()>& run);
 void add_eval(CLI::App& app, std::function<int()>& run);
 void add_map(CLI::App& app, std::function<int()>& run);
 void add_map_build(CLI::App& map, std::function<int()>& run);
+void add_map_board(CLI::App& map, std::function<int()>& run);
 void add_map_merge(CLI::App& map, std::function<int()>& run);
 void add_map_compare(CLI::App& map, std::function<int()>& run);
 void add_map_learn(CLI::App& map, std::function<int()>& run);

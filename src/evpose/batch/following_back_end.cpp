@@ -96,7 +96,6 @@ void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
   std::array<BlockRow, 2> rows;
   for (const ContourOffset& contour : contours) {
     std::size_t n = 0;
-    double residual = contour.offset_px;
     const auto add = [&](int block, int place, const BlockRow::Derivative& derivative) {
       if (static_cast<std::size_t>(block) >= places_.size())
         places_.resize(static_cast<std::size_t>(block) + 1);
@@ -108,14 +107,16 @@ void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
       const auto& segment = parameters_.segment(contour, across / length);
       const double by_offset = -across.dot(segment.across_map);
       add(1 + segment.place, segment.place, BlockRow::Derivative::Constant(1, by_offset));
-      residual -= by_offset * segment.offset_m;
     }
     if (const auto place = parameters_.places().intrinsics;
         place && contour.by_intrinsics.size() == parameters_.intrinsics_count())
       add(0, *place, contour.by_intrinsics);
-    if (n > 0)
-      measurement_.add({contour.by_pose(R), contour.weight, residual, contour.offset_px, {rows.data(), n}});
+    if (n > 0) measurement_.add({contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}});
   }
+}
+
+Eigen::Vector3d FollowingBackEnd::displacement_of(std::uint32_t segment) const {
+  return parameters_.displacement_of(segment);
 }
 
 /// What an error of the time offset does to the seen pose. The rate is that of the trajectory over a while:

@@ -37,6 +37,13 @@ const StaticParameters::Segment& StaticParameters::segment(const ContourOffset& 
   return segments_[found->second];
 }
 
+Eigen::Vector3d StaticParameters::displacement_of(std::uint32_t segment) const {
+  const auto known = segment_of_number_.find(segment);
+  if (known == segment_of_number_.end()) return Eigen::Vector3d::Zero();
+  const Segment& found = segments_[known->second];
+  return found.offset_m * found.across_map;
+}
+
 Eigen::VectorXd StaticParameters::calibration_errors() const {
   Eigen::VectorXd out(calibration_size_);
   if (places_.time) out(*places_.time) = found_.time_offset_s;

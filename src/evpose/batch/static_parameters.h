@@ -40,6 +40,8 @@ class StaticParameters {
   };
   /// The segment becomes a parameter when it is seen first.
   const Segment& segment(const ContourOffset& contour, const Eigen::Vector3d& across_map);
+  /// From where the map has the segment, map frame, m; zero before it is seen.
+  Eigen::Vector3d displacement_of(std::uint32_t segment) const;
 
   /// The present values, as differences from what was given, with their sigmas.
   const Calibration& calibration() const { return found_; }

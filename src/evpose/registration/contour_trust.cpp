@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "evpose/registration/contrast_memory.h"
 
 namespace evpose {
 namespace {
@@ -20,6 +23,12 @@ GateSums& GateSums::operator+=(const GateSums& other) {
 GateSums& GateSums::operator*=(double share) {
   weight *= share, inside *= share, at_gate *= share;
   return *this;
+}
+
+void ContourTrust::rearrange(std::span<const std::uint32_t> before) {
+  const std::vector<Segment> old = std::exchange(segments_, std::vector<Segment>(before.size()));
+  for (std::size_t i = 0; i < before.size(); ++i)
+    if (before[i] != ContrastMemory::kNew) segments_[i] = old[before[i]];
 }
 
 void ContourTrust::add(std::uint32_t segment, const GateSums& sums) {

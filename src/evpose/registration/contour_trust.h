@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace evpose {
@@ -27,6 +28,8 @@ class ContourTrust {
  public:
   explicit ContourTrust(std::uint32_t segments) : segments_(segments) {}
 
+  /// The segments are others now: `before` has the number that each had, or ContrastMemory::kNew.
+  void rearrange(std::span<const std::uint32_t> before);
   /// Time passes: what was seen before counts less.
   void advance(double span_s) { now_s_ += span_s; }
   void add(std::uint32_t segment, const GateSums& sums);

@@ -5,6 +5,9 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
+
+#include "evpose/registration/contrast_memory.h"
 
 namespace evpose {
 namespace {
@@ -47,6 +50,18 @@ TEST(ContourTrust, WhatWasSeenLongAgoIsForgotten) {
   trust.advance(5);
   trust.add(0, events(200, kCommon, random));
   EXPECT_GT(trust.trust(0, kCommon), 0.9);
+}
+
+TEST(ContourTrust, IsKeptWhereTheMapsSegmentsAreOthers) {
+  std::mt19937 random(4);
+  ContourTrust trust(2);
+  trust.add(0, events(2000, 0, random));
+  trust.add(1, events(2000, kCommon, random));
+  const double wrong = trust.trust(0, kCommon), right = trust.trust(1, kCommon);
+  trust.rearrange(std::vector<std::uint32_t>{1, ContrastMemory::kNew, 0});
+  EXPECT_EQ(trust.trust(0, kCommon), right);
+  EXPECT_EQ(trust.trust(1, kCommon), 1);
+  EXPECT_EQ(trust.trust(2, kCommon), wrong);
 }
 
 }  // namespace

@@ -63,6 +63,7 @@ class EventRegistration final : public Registration {
   const ContrastMemory* contrast() const override { return &contrast_; }
   void rearrange_segments(std::span<const std::uint32_t> before, std::span<const int> map_contrast) override {
     contrast_.rearrange(before, map_contrast);
+    if (config_.judge_contours) trust_.rearrange(before);
   }
   /// How far behind this contour its events are expected, px along its motion.
   EdgeDelay edge_delay(const ContourSample& sample) const;

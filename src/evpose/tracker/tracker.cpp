@@ -196,9 +196,9 @@ void Tracker::see_contours(double span_s) {
 /// Where the map has them, or where their segments are known to stand.
 void Tracker::project_samples(const FusionState& state, double span_s) {
   contours_.project(state, span_s);
-  if (!offset_segments_.empty())
+  if (!map_.offset_segments.empty())
     contours_.displace(
-        [this](std::uint32_t point) { return fusion_->displacement_of(offset_segments_[point]); });
+        [this](std::uint32_t point) { return fusion_->displacement_of(map_.offset_segments[point]); });
 }
 
 Update Tracker::update(TimeNs t) {

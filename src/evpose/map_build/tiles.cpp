@@ -138,6 +138,7 @@ std::optional<LineSegment> clipped(const LineSegment& segment, const CloudTile& 
 }
 
 void append_tile(const ContourMap& tile, ContourMap& whole) {
+  if (tile.points.empty() && tile.planes.empty()) return;
   const auto planes = static_cast<std::int32_t>(whole.planes.size());
   const auto polygons = static_cast<std::int32_t>(whole.polygons.size());
   const auto last = std::find_if(whole.points.rbegin(), whole.points.rend(),

@@ -434,7 +434,7 @@ TEST(ErrorStateFilter, ASharedErrorDoesNotAverageOut) {
     JointMeasurement m;
     m.start({weight * by_pose * by_pose.transpose(), Vector6d::Zero()});
     m.expect_shared_errors(1);
-    m.add_shared_error(0, px, {by_pose, weight, 0, 0, {}});
+    m.add_shared_error(0, px, {by_pose, weight, 0, {}});
     filter.update(m);
     const double told = n * weight * by_x * by_x * sigma_m * sigma_m;
     const double expected = px / by_x * told / (1 + told);

@@ -35,7 +35,7 @@ VisibleSetConfig visible_config(const TrackerConfig& config) {
 std::unique_ptr<Registration> make_registration(const TrackerConfig& config, ImageSize size,
                                                 const ContourMap& map, const ContourSegments& segments) {
   EventRegistrationConfig events = config.event_registration;
-  events.judge_contours = states_errors(map);
+  events.judge_contours = config.fusion.segment_offsets == SegmentOffsetUse::on;
   const std::vector<int> contrast = contrast_of_segments(map, segments);
   const auto seeded = [&](auto registration) -> std::unique_ptr<Registration> {
     for (std::uint32_t i = 0; i < segments.count; ++i) registration->seed_contrast(i, contrast[i]);

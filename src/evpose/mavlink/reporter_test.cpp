@@ -27,7 +27,9 @@ TEST(MavlinkReporter, LongWordsComeInChunksThatJoinToTheWhole) {
     const std::size_t chunks = sent.size() / 2;
     EXPECT_EQ(chunks, whole.size() <= 50 ? 1 : whole.size() / 50 + 1);
     EXPECT_EQ(sent.front().id != 0, whole.size() > 50);
-    if (chunks > 1) EXPECT_NE(sent.front().id, sent.back().id) << "each text has a number of its own";
+    if (chunks > 1) {
+      EXPECT_NE(sent.front().id, sent.back().id) << "each text has a number of its own";
+    }
     std::string joined;
     for (std::size_t k = 0; k < chunks; ++k) {
       EXPECT_EQ(sent[k].chunk_seq, k);

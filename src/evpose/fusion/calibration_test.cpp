@@ -63,13 +63,15 @@ FusionConfig flight_config(const CalibrationConfig& calibration) {
   return config;
 }
 
-/// What the camera's contours, some of each segment, say of the pose that it sees; their segments stand off.
-std::vector<ContourOffset> see_segments(const Pose& seen, const Pose& predicted,
+/// What the camera's contours, some of each segment, say of the pose that it sees; their segments stand off,
+/// and are measured where the filter knows them to stand.
+std::vector<ContourOffset> see_segments(const Pose& seen, const BackEnd& filter,
                                         const std::vector<double>& offsets_m, std::mt19937& random) {
   constexpr double kWeight_px2 = 25;  // a fifth of a pixel
   std::mt19937 layout(3);             // the map is the same at each update
   std::uniform_real_distribution<double> place(-1, 1);
   std::normal_distribution<double> noise(0, 1 / std::sqrt(kWeight_px2));
+  const Pose& predicted = filter.state().nav.T_map_body;
   const Vector6d ahead = seen.minus(predicted);
   std::vector<ContourOffset> out;
   for (std::uint32_t segment = 0; segment < offsets_m.size(); ++segment) {
@@ -81,7 +83,8 @@ std::vector<ContourOffset> see_segments(const Pose& seen, const Pose& predicted,
                             kWeight_px2, segment};
       Vector6d by_pose;
       by_pose << 200 * across, contour.point_body.cross(contour.across_body);
-      contour.offset_px = by_pose.dot(ahead) - 200 * offsets_m[segment] + noise(random);
+      const double known_m = across.dot(filter.displacement_of(segment));
+      contour.offset_px = by_pose.dot(ahead) - 200 * (offsets_m[segment] - known_m) + noise(random);
       out.push_back(contour);
     }
   }
@@ -168,10 +171,9 @@ Found fly(const Wrong& wrong, const FusionConfig& config, int seconds, unsigned 
     out.frozen += ekf.calibration().frozen ? 1 : 0;
     const Pose assumed{now.turn * T_body_cam.q, T_body_cam.p + now.shift};
     if (!wrong.offsets_m.empty()) {
-      const Pose& predicted = ekf.state().nav.T_map_body;
       const Pose seen = truth[k].T_map_body * true_T_body_cam * assumed.inverse();
-      const auto contours = see_segments(seen, predicted, wrong.offsets_m, random);
-      ekf.update(summed(contours, predicted), contours);
+      const auto contours = see_segments(seen, ekf, wrong.offsets_m, random);
+      ekf.update(summed(contours, ekf.state().nav.T_map_body), contours);
       continue;
     }
     Vector6d scatter;

@@ -21,8 +21,10 @@ constexpr double kFewestInCell = 8;  // below, a cell says nothing
 constexpr double kFewestCells = 9;   // of a part that becomes a plane
 constexpr double kStandsOff = 3;     // sigma of a cell's mean: from which on it is of another surface
 constexpr double kUneven_m = 4e-3;   // by which surfaces are uneven and still one
-constexpr double kFirstWidth = 1.5, kLastWidth = 0.4;  // noise: of the weights of the larger surface's fit
+constexpr double kFirstWidth = 0.8, kLastWidth = 0.4;  // noise: of the weights of the larger surface's fit
 constexpr int kRounds = 12;
+constexpr std::size_t kBegins = 16;  // cells around which the fit begins
+constexpr double kBeginShare = 0.2;  // of the plane's extent: how far around
 
 struct Cell {
   double count = 0;
@@ -47,6 +49,12 @@ class LayeredPlane {
   std::vector<std::uint32_t> largest_part_beside(double least_points) const;
 
  private:
+  struct Fit {
+    Form form;
+    double weight;  ///< sum over the cells
+  };
+  template <class WeightOf>
+  std::optional<Fit> fitted(const WeightOf& weight_of) const;
   std::optional<Form> larger_surface() const;
   double sigma_m(const Cell& cell) const { return noise_m_ / std::sqrt(cell.count); }
 
@@ -78,26 +86,53 @@ LayeredPlane::LayeredPlane(const SurfacePoints& surface, const std::vector<std::
   std::erase_if(cells_, [](const auto& entry) { return entry.second.count < kFewestInCell; });
 }
 
-/// Weights that fall off ever more narrowly: of two surfaces the fit ends in the larger one.
-std::optional<Form> LayeredPlane::larger_surface() const {
-  Form form = Form::Zero();
-  for (int round = 0; round < kRounds; ++round) {
-    const double width = noise_m_ * kFirstWidth * std::pow(kLastWidth / kFirstWidth, round / (kRounds - 1.0));
-    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (const auto& [place, cell] : cells_) {
-      const double z = off(form, cell) / width;
-      const double weight = cell.count / ((1 + z * z) * (1 + z * z));
-      const Eigen::Vector3d at = cell.mean(), row(1, at.x(), at.y());
-      squares += weight * row * row.transpose();
-      right += weight * at.z() * row;
-    }
-    const Eigen::LDLT<Eigen::Matrix3d> solver(squares);
-    if (solver.info() != Eigen::Success) return {};
-    form = solver.solve(right);
-    if (!form.allFinite()) return {};
+/// Weighted by `weight_of(cell)`.
+template <class WeightOf>
+std::optional<LayeredPlane::Fit> LayeredPlane::fitted(const WeightOf& weight_of) const {
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double sum = 0;
+  for (const auto& [place, cell] : cells_) {
+    const double weight = weight_of(cell);
+    const Eigen::Vector3d at = cell.mean(), row(1, at.x(), at.y());
+    squares += weight * row * row.transpose();
+    right += weight * at.z() * row;
+    sum += weight;
   }
-  return form;
+  const Eigen::LDLT<Eigen::Matrix3d> solver(squares);
+  if (solver.info() != Eigen::Success) return {};
+  const Form form = solver.solve(right);
+  if (!form.allFinite()) return {};
+  return Fit{form, sum};
+}
+
+/// A fit to all of a layered plane leans through both layers and stays there. So it begins around many
+/// places, and its weights fall off ever more narrowly; what gathers most weight is the larger surface.
+std::optional<Form> LayeredPlane::larger_surface() const {
+  Eigen::AlignedBox2d box;
+  for (const auto& [place, cell] : cells_) box.extend(cell.mean().head<2>());
+  const double near_m = kBeginShare * box.diagonal().norm();
+  std::optional<Fit> best;
+  std::size_t number = 0;
+  const std::size_t stride = std::max<std::size_t>(1, cells_.size() / kBegins);
+  for (const auto& [place, begin] : cells_) {
+    if (number++ % stride != stride / 2) continue;
+    std::optional<Fit> fit = fitted([&](const Cell& cell) {
+      return (cell.mean() - begin.mean()).head<2>().norm() < near_m ? cell.count : 0;
+    });
+    for (int round = 0; fit && round < kRounds; ++round) {
+      const double share = round / (kRounds - 1.0);
+      const double width_m = noise_m_ * kFirstWidth * std::pow(kLastWidth / kFirstWidth, share);
+      const Form form = fit->form;
+      fit = fitted([&](const Cell& cell) {
+        const double z = off(form, cell) / width_m;
+        return cell.count / ((1 + z * z) * (1 + z * z));
+      });
+    }
+    if (fit && (!best || fit->weight > best->weight)) best = fit;
+  }
+  if (!best) return {};
+  return best->form;
 }
 
 std::vector<std::uint32_t> LayeredPlane::largest_part_beside(double least_points) const {

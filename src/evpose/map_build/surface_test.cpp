@@ -7,6 +7,7 @@
 
 #include "evpose/map_build/neighbours.h"
 #include "evpose/map_build/outlines.h"
+#include "evpose/map_build/plane_split.h"
 #include "evpose/map_build/test_scan.h"
 
 namespace evpose::map_build {
@@ -89,6 +90,32 @@ TEST(Outline, WhatPointsAreTooFewToCoverHidesNothing) {
     for (const Ring& ring : trace_outline(surface, plane).solid) solid += 0.5 * twice_area(ring.corners);
   EXPECT_GT(solid, 0.9);
   EXPECT_LT(solid, 1.25);
+}
+
+TEST(PlaneSplit, LayersOfOnePlaneArePartedAndASinglePlaneIsNot) {
+  for (const double step_m : {0.0, 0.025, 0.04}) {
+    const PointCloud cloud = Scan(7)
+                                 .rectangle({0, 0, 0}, {4, 0, 0}, {0, 0, 1.7})
+                                 .rectangle({0, step_m, 1.7}, {4, 0, 0}, {0, 0, 0.8})
+                                 .cloud();
+    const SurfacePoints surface = described(cloud.points);
+    std::vector<std::int32_t> label(cloud.points.size(), 0);
+    const std::int32_t planes = split_layered_planes(surface, 40, 1, label);
+    if (step_m == 0) {
+      EXPECT_EQ(planes, 1);
+      continue;
+    }
+    ASSERT_EQ(planes, 2) << step_m;
+    constexpr double kCell_m = 0.1;  // points whose cell lies on both layers may go to either
+    int wrong = 0, sure = 0;
+    for (std::size_t i = 0; i < label.size(); ++i) {
+      const double height_m = static_cast<double>(surface.position[i].z());
+      if (std::abs(height_m - 1.7) < kCell_m) continue;
+      ++sure;
+      wrong += (label[i] == 1) != (height_m > 1.7);
+    }
+    EXPECT_LT(wrong, 0.03 * sure) << step_m;
+  }
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ class UsageTest(unittest.TestCase):
                 told = subprocess.run(["groff", "-man", "-ww", "-Tutf8", man], capture_output=True, text=True, timeout=60)
                 self.assertEqual((told.returncode, told.stderr), (0, ""))
             self.assertEqual(self.completed(bash, "tra"), ["track"])
-            self.assertEqual(self.completed(bash, "-q", "map", "b"), ["build"])
+            self.assertEqual(self.completed(bash, "-q", "map", "bu"), ["build"])
             self.assertEqual(self.completed(bash, "track", "fligh"), [], "files are the shell's own")
 
     def completed(self, bash, *words):

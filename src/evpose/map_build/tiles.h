@@ -34,8 +34,8 @@ PointCloud points_seen_by(const PointCloud& cloud, const CloudTile& tile);
 /// The part of a segment that lies in a tile's core.
 std::optional<LineSegment> clipped(const LineSegment& segment, const CloudTile& tile);
 
-/// Adds the map of a tile to that of the tiles before it, as a page; nothing if nothing is in it. Both have one
-/// anchor, and contours that are numbered in the order of their points.
+/// Adds the map of a tile to that of the tiles before it, as a page; nothing if nothing is in it. Both have
+/// one anchor, and contours that are numbered in the order of their points.
 void append_tile(const ContourMap& tile, ContourMap& whole);
 
 }  // namespace evpose::map_build

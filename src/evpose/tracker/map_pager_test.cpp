@@ -114,7 +114,7 @@ struct Flight {
 /// Tracks the boxes with a map whose middle is so far away that the later part is taken in the midst of the
 /// flight.
 Flight fly(const ContourMap& whole, std::shared_ptr<const ContourMap> first,
-           std::shared_ptr<const ContourMap> later, bool offsets) {
+           const std::shared_ptr<const ContourMap>& later, bool offsets) {
   Flight out;
   TrackerSetup setup;
   setup.camera = test_flight::make_flight_camera();

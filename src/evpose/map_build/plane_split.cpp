@@ -117,9 +117,9 @@ std::optional<Form> LayeredPlane::larger_surface() const {
   const std::size_t stride = std::max<std::size_t>(1, cells_.size() / kBegins);
   for (const auto& [place, begin] : cells_) {
     if (number++ % stride != stride / 2) continue;
-    std::optional<Fit> fit = fitted([&](const Cell& cell) {
-      return (cell.mean() - begin.mean()).head<2>().norm() < near_m ? cell.count : 0;
-    });
+    const Eigen::Vector2d middle = begin.mean().head<2>();
+    std::optional<Fit> fit = fitted(
+        [&](const Cell& cell) { return (cell.mean().head<2>() - middle).norm() < near_m ? cell.count : 0; });
     for (int round = 0; fit && round < kRounds; ++round) {
       const double share = round / (kRounds - 1.0);
       const double width_m = noise_m_ * kFirstWidth * std::pow(kLastWidth / kFirstWidth, share);

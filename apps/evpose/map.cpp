@@ -107,6 +107,7 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   auto* map = app.add_subcommand("map", "Make and look at map files");
   map->require_subcommand(1);
   add_map_build(*map, run);
+  add_map_board(*map, run);
   struct Options {
     std::string input, occluders, output = "map.h5", report;
     Placing placing;

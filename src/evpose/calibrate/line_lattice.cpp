@@ -15,7 +15,7 @@ constexpr double kAgrees = 0.15;  // and of the distance between two
 constexpr int kLeastLines = 4;
 constexpr int kLargestGap = 3;    // between two lines that are next to each other in the image
 constexpr double kMissing = 0.4;  // of a line that agrees: what one that is not there costs
-constexpr std::size_t kMostLines = 16;
+constexpr std::size_t kMostOfFamily = 16;
 constexpr double kFamily = 0.4;  // rad that a normal may be off the family's
 
 struct Place {
@@ -90,7 +90,7 @@ std::vector<Place> places_of(std::span<const EventLine> lines, const Eigen::Vect
   std::vector<Place> out;
   for (const EventLine& line : lines) {
     const double along = line.normal.dot(normal);
-    if (angle_to(line, normal) > kFamily || out.size() == kMostLines) continue;
+    if (angle_to(line, normal) > kFamily || out.size() == kMostOfFamily) continue;
     out.push_back({line, (line.offset - line.normal.dot(middle)) / along});
   }
   std::ranges::sort(out, {}, &Place::at);

@@ -57,7 +57,8 @@ TEST(BoardMap, ContoursAreWhereTheShadeChanges) {
 TEST(BoardMap, LengthIsThatOfAllEdges) {
   const auto length = [](const Board& board) {
     double sum = 0;
-    for (const auto& p : board_map(board)->points) sum += static_cast<double>(p.length);
+    const ContourMap map = *board_map(board);
+    for (const auto& p : map.points) sum += static_cast<double>(p.length);
     return sum;
   };
   EXPECT_NEAR(length(Checkerboard{9, 7, 0.08}), 32 * 4 * 0.08, 1e-4);
@@ -69,7 +70,8 @@ TEST(BoardMap, LengthIsThatOfAllEdges) {
 std::set<std::array<long, 4>> turned(const Board& board, double angle) {
   std::set<std::array<long, 4>> out;
   const Eigen::AngleAxisf turn(static_cast<float>(angle), Eigen::Vector3f::UnitY());
-  for (const auto& p : board_map(board)->points) {
+  const ContourMap map = *board_map(board);
+  for (const auto& p : map.points) {
     const Eigen::Vector3f at = 1e5F * (turn * p.position), n = turn * p.normal;
     const auto rounded = [](float v) { return std::lround(0.1F * v); };
     out.insert({rounded(at.x() + 3.3F), rounded(at.z() + 3.3F), std::lround(n.x()), std::lround(n.z())});

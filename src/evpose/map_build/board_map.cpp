@@ -148,7 +148,8 @@ std::string board_symmetry(const Board& board) {
   if (const auto* b = std::get_if<AprilGrid>(&board)) return b->columns == b->rows ? kQuarterTurn : kHalfTurn;
   const auto& b = std::get<CircleGrid>(board);
   if (!b.shifted) return b.columns == b.rows ? kQuarterTurn : kHalfTurn;
-  return b.rows % 2 == 0 ? "" : kHalfTurn;  // a row that is shifted comes to lie on one that is not
+  // Turned, the discs of a row are where those of a shifted row were.
+  return b.rows % 2 == 0 ? kHalfTurn : "";
 }
 
 }  // namespace evpose

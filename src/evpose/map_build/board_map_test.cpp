@@ -74,14 +74,22 @@ std::set<std::array<long, 4>> turned(const Board& board, double angle) {
   for (const auto& p : map.points) {
     const Eigen::Vector3f at = 1e5F * (turn * p.position), n = turn * p.normal;
     const auto rounded = [](float v) { return std::lround(0.1F * v); };
-    out.insert({rounded(at.x() + 3.3F), rounded(at.z() + 3.3F), std::lround(n.x()), std::lround(n.z())});
+    out.insert({rounded(at.x() + 3.3F), rounded(at.z() + 3.3F), rounded(1e3F * n.x() + 3.3F),
+                rounded(1e3F * n.z() + 3.3F)});
   }
   return out;
 }
 
 TEST(BoardMap, SaysHowItMayBeTurned) {
-  const Board boards[] = {Checkerboard{9, 7, 0.08}, Checkerboard{7, 10, 0.027}, Checkerboard{5, 5, 0.05},
-                          Checkerboard{6, 6, 0.05}, AprilGrid{6, 6, 0.08, 0.3}, AprilGrid{6, 4, 0.08, 0.3}};
+  const Board boards[] = {Checkerboard{9, 7, 0.08},
+                          Checkerboard{7, 10, 0.027},
+                          Checkerboard{5, 5, 0.05},
+                          Checkerboard{6, 6, 0.05},
+                          AprilGrid{6, 6, 0.08, 0.3},
+                          AprilGrid{6, 4, 0.08, 0.3},
+                          CircleGrid{4, 11, 0.04, 0.02, true},
+                          CircleGrid{4, 6, 0.04, 0.02, true},
+                          CircleGrid{5, 7, 0.04, 0.02, false}};
   for (const Board& board : boards) {
     const auto upright = turned(board, 0);
     const bool half = upright == turned(board, M_PI), quarter = upright == turned(board, M_PI / 2);

@@ -6,6 +6,7 @@
 
 #include "evpose/core/error.h"
 #include "evpose/fusion/calibration_states.h"
+#include "evpose/fusion/shared_errors.h"
 
 namespace evpose {
 namespace {
@@ -111,7 +112,9 @@ void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
     if (const auto place = parameters_.places().intrinsics;
         place && contour.by_intrinsics.size() == parameters_.intrinsics_count())
       add(0, *place, contour.by_intrinsics);
-    if (n > 0) measurement_.add({contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}});
+    const BlockSample sample{contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}};
+    if (n > 0) measurement_.add(sample);
+    SharedErrors::add(contour, sample, measurement_);
   }
 }
 
@@ -133,7 +136,8 @@ Vector6d FollowingBackEnd::seen_pose_by_time() const {
   return seen_pose_by_time_offset(state);
 }
 
-/// The measurement, of the seen pose and of blocks, as one of the pose and of parameters.
+/// The measurement, of the seen pose and of blocks, as one of the pose and of parameters. Of shared errors
+/// among themselves it says nothing, since they are not estimated.
 ChainMeasurement FollowingBackEnd::by_parameters() const {
   const StaticParameters::Places& at = parameters_.places();
   std::vector<std::pair<int, Vector6d>> shifts;
@@ -146,7 +150,9 @@ ChainMeasurement FollowingBackEnd::by_parameters() const {
 
   ChainMeasurement out;
   const auto shifted = static_cast<Eigen::Index>(shifts.size());
-  const Eigen::Index blocks = measurement_.size() - 6, all = 6 + shifted + blocks;
+  const int first = parameters_.first_shared();
+  const Eigen::Index blocks = measurement_.size() - 6, shared = SharedErrors::kCount - first;
+  const Eigen::Index told = 6 + shifted + blocks, all = told + shared;
   Eigen::MatrixXd by_shifts(6, shifted);  // of the seen pose
   for (Eigen::Index i = 0; i < shifted; ++i) {
     out.parameters.push_back(shifts[static_cast<std::size_t>(i)].first);
@@ -155,24 +161,31 @@ ChainMeasurement FollowingBackEnd::by_parameters() const {
   for (const JointMeasurement::Block& block : measurement_.blocks())
     for (int i = 0; i < block.size; ++i)
       out.parameters.push_back(places_[static_cast<std::size_t>(block.id)] + i);
+  for (int i = first; i < SharedErrors::kCount; ++i) out.parameters.push_back(at.shared + i);
   const auto H = measurement_.information();
   const auto pose = H.topLeftCorner<6, 6>();
   const auto mixed = H.topRightCorner(6, blocks);
   const Eigen::Matrix<double, 6, Eigen::Dynamic> pose_shifts = pose * by_shifts;
-  out.information.resize(all, all);
-  out.information << pose, pose_shifts, mixed,  //
+  out.information.setZero(all, all);
+  out.information.topLeftCorner(told, told) << pose, pose_shifts, mixed,  //
       pose_shifts.transpose(), by_shifts.transpose() * pose_shifts, by_shifts.transpose() * mixed,
       mixed.transpose(), mixed.transpose() * by_shifts, H.bottomRightCorner(blocks, blocks);
+  const auto by_shared = measurement_.shared_errors().rightCols(shared);
+  out.information.topRightCorner(told, shared) << by_shared.topRows<6>(),
+      by_shifts.transpose() * by_shared.topRows<6>(), by_shared.bottomRows(blocks);
+  out.information.bottomLeftCorner(shared, told) = out.information.topRightCorner(told, shared).transpose();
   const auto b = measurement_.vector();
-  out.vector.resize(all);
-  out.vector << b.head<6>(), by_shifts.transpose() * b.head<6>(), b.tail(blocks);
+  out.vector.setZero(all);
+  out.vector.head(told) << b.head<6>(), by_shifts.transpose() * b.head<6>(), b.tail(blocks);
   return out;
 }
 
 void FollowingBackEnd::update(const PoseInformation& measurement, std::span<const ContourOffset> contours) {
   if (state_.t != trajectory_[next_ - 1].t) return;  // after the trajectory's end
   measurement_.start(measurement);
-  if (takes_contours()) add_contours(contours);
+  measurement_.expect_shared_errors(SharedErrors::kCount);
+  add_contours(contours);
+  if (contour_callback_) contour_callback_(state_, contours);
   chain_.measure(by_parameters());
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "evpose/batch/chain_smoother.h"
@@ -10,6 +12,9 @@
 #include "evpose/fusion/joint_measurement.h"
 
 namespace evpose {
+
+/// Told of the contours that a state of the trajectory was measured with.
+using ContourCallback = std::function<void(const FusionState&, std::span<const ContourOffset>)>;
 
 /// In place of a fusion: the tracker measures along a known trajectory, and what IMU and contours say about
 /// its errors goes to a smoother (one step of Gauss-Newton over the whole recording).
@@ -20,6 +25,8 @@ class FollowingBackEnd final : public BackEnd {
   FollowingBackEnd(const StatePropagator& propagator, std::span<const FusionState> trajectory,
                    const Pose& T_body_cam, StaticParameters& parameters, ChainSmoother& chain);
 
+  void on_contours(ContourCallback callback) { contour_callback_ = std::move(callback); }
+
   using BackEnd::start;
   using BackEnd::update;
   /// First: what is known of the state at the start. Later, when the tracker takes biases up again that it
@@ -28,7 +35,7 @@ class FollowingBackEnd final : public BackEnd {
   void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
-  bool takes_contours() const override { return parameters_.takes_contours(); }
+  bool takes_contours() const override { return true; }
   Eigen::Vector3d displacement_of(std::uint32_t segment) const override;
   const FusionState& state() const override { return state_; }
   /// Zero: the trajectory needs no alignment of its start.
@@ -53,6 +60,7 @@ class FollowingBackEnd final : public BackEnd {
   Matrix15d transition_ = Matrix15d::Identity();
   Eigen::Matrix<double, 15, 2> by_tilt_ = Eigen::Matrix<double, 15, 2>::Zero();
   JointMeasurement measurement_;
+  ContourCallback contour_callback_;
   std::vector<int> places_;  ///< first parameter of each block of the measurement, by its id
 };
 

@@ -11,10 +11,17 @@
 
 namespace evpose {
 
-/// What does not change over the recordings and is estimated with the trajectories: errors of the
-/// calibration, offsets of map segments. Each has a place among the parameters of the ChainSmoother, a
-/// present value about which everything is linearised, and a prior about what was given, which stays whatever
-/// the present value.
+/// What is found of the parameters, and how sure it is; by their places.
+struct ParameterSolution {
+  Eigen::VectorXd z;
+  Eigen::MatrixXd covariance;
+};
+
+/// What does not change over the recordings: errors of the calibration and offsets of map segments, which are
+/// estimated with the trajectories, and errors that all contours share (SharedErrors), which are considered:
+/// they add to the covariance alone. Each has a place among the parameters of the ChainSmoother. Those that
+/// are estimated have a present value about which everything is linearised, and a prior about what was given,
+/// which stays whatever the present value.
 class StaticParameters {
  public:
   /// As a resolved FusionConfig asks for them.
@@ -24,12 +31,14 @@ class StaticParameters {
   /// First place of each; none: it is believed.
   struct Places {
     std::optional<int> time, rotation, translation, gravity, intrinsics;
+    int shared = 0;  ///< after the calibration
   };
   const Places& places() const { return places_; }
   Eigen::Index intrinsics_count() const { return intrinsics_count_; }
   bool estimates_segments() const { return segments_config_.has_value(); }
-  /// No contour says anything of the rest.
-  bool takes_contours() const { return places_.intrinsics.has_value() || estimates_segments(); }
+  /// Of the shared errors, the first that counts: a delay of all events is one of the time offset where that
+  /// is estimated.
+  int first_shared() const { return places_.time ? 1 : 0; }
   /// The calibration's parameters come first.
   int calibration_size() const { return calibration_size_; }
 
@@ -47,20 +56,34 @@ class StaticParameters {
   const Calibration& calibration() const { return found_; }
   /// What is known without the recordings, about the present values.
   ParameterInformation prior() const;
+  /// The parameters by the prior and by what recordings say of them, about the present values. `trust`:
+  /// factor on the information of what was given of the calibration.
+  ParameterSolution solve(const ParameterInformation& of_recordings, double trust = 1) const;
+  /// The largest change of a number of the calibration, in sigma.
+  double change(const ParameterSolution& solution) const;
   /// The calibration's values change by what was found beside them.
   void add(const Calibration& found);
-  /// The values change by z.
-  void correct(const Eigen::VectorXd& z, const Eigen::MatrixXd& covariance);
+  /// The values change by the solution.
+  void correct(const ParameterSolution& solution);
   /// Present values minus given ones: calibration only, in the order of the places.
   Eigen::VectorXd calibration_errors() const;
+  /// Of what was given, in the order of the places.
+  const Eigen::VectorXd& given_sigma() const { return given_sigma_; }
+  /// Of the last correction, as CalibrationSigma::correlation: n intrinsics, and with an IMU its pose and
+  /// time.
+  Eigen::MatrixXd calibration_correlation(Eigen::Index n, bool with_imu) const;
 
  private:
+  void state_prior(const CalibrationConfig& config, const std::vector<double>& sigmas);
+
   std::optional<SegmentOffsetConfig> segments_config_;
   Places places_;
-  Eigen::VectorXd calibration_sigma_;  ///< of what was given
+  Eigen::VectorXd given_sigma_;              ///< of the calibration
+  Eigen::MatrixXd calibration_information_;  ///< about what was given
   Eigen::Index intrinsics_count_ = 0;
   int calibration_size_ = 0, size_ = 0;
   Calibration found_;
+  Eigen::MatrixXd calibration_covariance_;
   std::vector<Segment> segments_;
   std::unordered_map<std::uint32_t, std::size_t> segment_of_number_;
 };

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/calibrate/joint_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "evpose/calibrate/coarse_camera.h"
+#include "evpose/core/log.h"
+#include "evpose/tracker/tracker_parts.h"
+
+namespace evpose {
+namespace {
+
+constexpr int kFilterRuns = 2;  // of the first recording: the second from what the first has found
+constexpr int kMostPasses = 8;
+constexpr double kStill = 0.1;          // change of a pass, in sigma, that is not worth another
+constexpr double kLeastTracking = 0.2;  // share of the updates: below it, it is another view that was found
+constexpr double kUnknown = 1e-4;       // trust in what was given, where the events shall speak alone
+constexpr double kSteps = kFilterRuns + kMostPasses;
+
+double share_of_tracking(std::span<const Update> updates) {
+  const auto good = std::ranges::count(updates, Health::tracking, &Update::health);
+  return updates.empty() ? 0 : static_cast<double>(good) / static_cast<double>(updates.size());
+}
+
+}  // namespace
+
+JointCalibration::JointCalibration(std::vector<TrackJob> jobs)
+    : jobs_(std::move(jobs)), residuals_(jobs_.front().setup.camera->size()) {}
+
+bool JointCalibration::go_on(const Progress& progress, double share) {
+  const double of = kSteps * static_cast<double>(jobs_.size());
+  return !(interrupted_ = !progress((done_ + share) / of));
+}
+
+double JointCalibration::tracking_share(std::size_t k) const {
+  return share_of_tracking(flights_[k]->updates());
+}
+
+Eigen::MatrixXd JointCalibration::correlation() const {
+  const CameraIntrinsics& camera = jobs_.front().recording.camera;
+  return parameters_->calibration_correlation(4 + static_cast<Eigen::Index>(camera.distortion.size()),
+                                              jobs_.front().recording.has_imu);
+}
+
+/// The parameters, at values that the filter can begin with.
+Status JointCalibration::begin_parameters() {
+  const TrackJob& job = jobs_.front();
+  auto fusion = resolved(job.config.tracker.fusion, states_errors(*job.map));
+  if (!fusion) return fusion.error();
+  choose_states(job.setup, *fusion);
+  const auto coarse = coarse_camera(job);
+  if (!coarse) return coarse.error();
+  parameters_ = std::make_shared<StaticParameters>(*fusion);
+  parameters_->add(*coarse);
+  return {};
+}
+
+/// The trajectories to begin with.
+Status JointCalibration::begin(const TrackRequest& request, const Progress& progress) {
+  if (auto ok = begin_parameters(); !ok) return ok;
+  for (std::size_t k = 0; k < jobs_.size(); ++k) {
+    flights_.push_back(std::make_unique<BatchEstimator>(jobs_[k], parameters_));
+    BatchEstimator& flight = *flights_.back();
+    for (int run = 0; run < (k == 0 ? kFilterRuns : 1); ++run) {
+      const auto told = [&](double share) { return go_on(progress, share); };
+      if (auto ok = flight.filter(request, told); !ok) return ok;
+      if (interrupted_) return {};
+      ++done_;
+      if (!std::ranges::any_of(flight.updates(), &Update::accepted))
+        return Error{jobs_[k].recording.folder, "the events never gathered at the map's contours",
+                     "check the start pose, the map and the focal length"};
+    }
+    flight_residuals_.emplace_back(residuals_);
+    flight.on_contours([this, k](const FusionState&, std::span<const ContourOffset> contours) {
+      const TrackerSetup& setup = flights_[k]->followed();
+      for (ResidualField* field : {&residuals_, &flight_residuals_[k]})
+        field->add(contours, *setup.camera, setup.T_body_cam);
+    });
+  }
+  return {};
+}
+
+/// One step of Gauss-Newton over all recordings; by how much it has moved anything, in sigma.
+Expected<double> JointCalibration::pass(const Progress& progress) {
+  residuals_ = ResidualField(jobs_.front().setup.camera->size());
+  std::ranges::fill(flight_residuals_, residuals_);
+  ParameterInformation told;
+  for (const auto& flight : flights_) {
+    const auto told_by_one = flight->measure([&](double share) { return go_on(progress, share); });
+    if (!told_by_one) return told_by_one.error();
+    if (interrupted_) return 0;
+    told.add(*told_by_one);
+    ++done_;
+  }
+  judge_given(told);
+  const ParameterSolution solution = parameters_->solve(told);
+  double change = parameters_->change(solution);
+  log_detail(text("calibration moves by ", change, " sigma"));
+  for (const auto& flight : flights_) change = std::max(change, flight->take(solution));
+  parameters_->correct(solution);
+  return change;
+}
+
+void JointCalibration::judge_given(const ParameterInformation& told) {
+  const ParameterSolution alone = parameters_->solve(told, kUnknown);
+  const Eigen::Index n = parameters_->calibration_size();
+  const Eigen::VectorXd value = parameters_->calibration_errors() + alone.z.head(n);
+  const Eigen::VectorXd given = parameters_->given_sigma();
+  contradiction_.setZero(n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    contradiction_(i) = value(i) / std::sqrt(given(i) * given(i) + alone.covariance(i, i));
+}
+
+Status JointCalibration::estimate(const TrackRequest& request, const Progress& progress) {
+  if (auto ok = begin(request, progress); !ok || interrupted_) return ok;
+  for (int k = 0; k < kMostPasses && !converged_; ++k) {
+    const auto change = pass(progress);
+    if (!change) return change.error();
+    if (interrupted_) return {};
+    converged_ = *change < kStill;
+    log_detail(text("pass ", k + 1, ": change of ", *change, " sigma"));
+  }
+  for (std::size_t k = 0; k < size(); ++k)
+    if (tracking_share(k) < kLeastTracking)
+      return Error{jobs_[k].recording.folder,
+                   text("with the best calibration found, ", std::lround(100 * tracking_share(k)),
+                        " % of the poses agree with the map: a wrong view was found"),
+                   "give a better start pose or focal length, or begin where more of the map is in view"};
+  return {};
+}
+
+}  // namespace evpose

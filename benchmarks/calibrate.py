@@ -90,7 +90,9 @@ def board_map(bench, name, words):
 
 
 def board_flight(bench, seed):
-    return bench.simulated("board", BOARD_S, (f"seed={seed}", f"trajectory.phase_deg={60 * seed}"), f"board_{seed}")
+    """With the frames that the usual route needs."""
+    return bench.simulated("board", BOARD_S, (f"seed={seed}", f"trajectory.seed={seed + 1}", "frames.rate_hz=30"),
+                           f"board_{seed}")
 
 
 def of_boards(bench):
@@ -106,7 +108,8 @@ def of_boards(bench):
             found = bench.once(f"calibrate: board {seed} {kind}",
                                lambda: calibrated(bench, [folder], begin, "--map", board, "--init", "board"))
             tables_of[kind].append(row(f"seed {seed}", found, true))
-        frames = bench.once(f"calibrate: board {seed} frames", lambda: board_frames.simulated(bench, seed, BOARD_S))
+        frames = bench.once(f"calibrate: board {seed} frames",
+                            lambda: board_frames.calibrate(flight.folder.glob("frames/*.png"), (9, 7), 0.08))
         tables_of["frames"].append(row(f"seed {seed}", frames, true))
     return {kind: [*rows, means("mean", rows), GOAL] for kind, rows in tables_of.items()}
 

@@ -134,11 +134,11 @@ Expected<std::unique_ptr<Tracker>> BatchEstimator::follow(const Progress& progre
   return tracker;
 }
 
-double BatchEstimator::take(const ParameterSolution& found) {
+double BatchEstimator::take(const ParameterSolution& found, double share) {
   const auto smoothed = chain_.smooth(found.z, found.covariance);
   trajectory_.resize(smoothed.size());  // another time offset may have cost the last update
   for (std::size_t k = 0; k < smoothed.size(); ++k) {
-    trajectory_[k].add(smoothed[k].mean);
+    trajectory_[k].add(share * smoothed[k].mean);
     trajectory_[k].covariance = smoothed[k].covariance;
   }
   return pose_change(smoothed);

@@ -36,8 +36,9 @@ class BatchEstimator {
 
   /// The parts of a pass. measure() along the trajectory: what is said of the parameters.
   Expected<ParameterInformation> measure(const Progress& progress);
-  /// The trajectory given the parameters; by how much its poses move, RMS, in sigma.
-  double take(const ParameterSolution& found);
+  /// The trajectory given the parameters, or a share of the way there; by how much its poses would move, RMS,
+  /// in sigma.
+  double take(const ParameterSolution& found, double share = 1);
   /// After filter().
   const std::shared_ptr<StaticParameters>& parameters() const { return parameters_; }
   /// Told of what is measured in each pass.

@@ -126,7 +126,7 @@ Eigen::Vector3d FollowingBackEnd::displacement_of(std::uint32_t segment) const {
 /// the gyroscope's noise is that of the predictions as well, and a derivative that knew it would pull the
 /// offset to one side.
 Vector6d FollowingBackEnd::seen_pose_by_time() const {
-  constexpr TimeNs kToEachSide = 25 * kNsPerMs;
+  constexpr TimeNs kToEachSide = 4 * kNsPerMs;
   auto before = trajectory_.begin() + static_cast<std::ptrdiff_t>(next_ - 1), after = before;
   while (before != trajectory_.begin() && state_.t - before->t < kToEachSide) --before;
   while (after + 1 != trajectory_.end() && after->t - state_.t < kToEachSide) ++after;

@@ -151,7 +151,7 @@ class Flight {
     JointMeasurement probe;
     probe.start({});
     probe.expect_shared_errors(SharedErrors::kCount);
-    SharedErrors::add(contour, {Vector6d::Unit(0), 1, 0, 0, {}}, probe);
+    SharedErrors::add(contour, {Vector6d::Unit(0), 1, 0, {}}, probe);
     return probe.shared_errors().row(0).dot(shared_errors_);
   }
   void measure(FollowingBackEnd& follow, const AdjustedCamera& camera, const Pose& T_body_cam,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/calibrate/joint_calibration.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -13,8 +14,9 @@ namespace evpose {
 namespace {
 
 constexpr int kFilterRuns = 2;  // of the first recording: the second from what the first has found
-constexpr int kMostPasses = 8;
+constexpr int kMostPasses = 12;
 constexpr double kStill = 0.1;          // change of a pass, in sigma, that is not worth another
+constexpr double kTakenBack = 0.3, kShorter = 0.5, kLeastStep = 0.25;  // of steps that overshoot
 constexpr double kLeastTracking = 0.2;  // share of the updates: below it, it is another view that was found
 constexpr double kUnknown = 1e-4;       // trust in what was given, where the events shall speak alone
 constexpr double kSteps = kFilterRuns + kMostPasses;
@@ -95,12 +97,27 @@ Expected<double> JointCalibration::pass(const Progress& progress) {
     ++done_;
   }
   judge_given(told);
-  const ParameterSolution solution = parameters_->solve(told);
+  ParameterSolution solution = parameters_->solve(told);
   double change = parameters_->change(solution);
   log_detail(text("calibration moves by ", change, " sigma"));
-  for (const auto& flight : flights_) change = std::max(change, flight->take(solution));
+  const double share = share_of_step(solution);
+  for (const auto& flight : flights_) change = std::max(change, flight->take(solution, share));
+  solution.z *= share;
   parameters_->correct(solution);
   return change;
+}
+
+/// A step that takes back much of the last one has gone too far, and so had that: half of it, from then on.
+double JointCalibration::share_of_step(const ParameterSolution& solution) {
+  const Eigen::Index n = parameters_->calibration_size();
+  const Eigen::VectorXd step = solution.z.head(n);
+  if (last_step_.size() == n) {
+    const Eigen::VectorXd weighted = solution.covariance.topLeftCorner(n, n).ldlt().solve(last_step_);
+    if (step.dot(weighted) < -kTakenBack * last_step_.dot(weighted))
+      step_share_ = std::max(kLeastStep, kShorter * step_share_);
+  }
+  last_step_ = step_share_ * step;
+  return step_share_;
 }
 
 void JointCalibration::judge_given(const ParameterInformation& told) {

@@ -47,6 +47,7 @@ class JointCalibration {
   Status begin_parameters();
   Status begin(const TrackRequest& request, const Progress& progress);
   Expected<double> pass(const Progress& progress);
+  double share_of_step(const ParameterSolution& solution);
   void judge_given(const ParameterInformation& told);
   bool go_on(const Progress& progress, double share);
 
@@ -57,6 +58,8 @@ class JointCalibration {
   ResidualField residuals_;
   Eigen::VectorXd contradiction_;
   bool interrupted_ = false, converged_ = false;
+  Eigen::VectorXd last_step_;  ///< of the calibration
+  double step_share_ = 1;
   double done_ = 0;  ///< steps of the work
 };
 

@@ -112,7 +112,3 @@ def judge(found, true):
         P, off = P[np.ix_(told, told)], off[told]
         out |= {"nees": float(off @ np.linalg.solve(P, off) / len(off)), "worst_sigma": float(np.max(np.abs(off) / np.sqrt(np.diag(P))))}
     return out
-
-
-def without_imu(chain):
-    return {key: value for key, value in chain.items() if key not in ("T_cam_imu", "time_s")}

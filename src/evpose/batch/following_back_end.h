@@ -35,7 +35,7 @@ class FollowingBackEnd final : public BackEnd {
   void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override;
   void predict(TimeNs t) override;
   void update(const PoseInformation& measurement, std::span<const ContourOffset> contours) override;
-  bool takes_contours() const override { return true; }
+  bool takes_contours() const override { return parameters_.takes_contours(); }
   Eigen::Vector3d displacement_of(std::uint32_t segment) const override;
   const FusionState& state() const override { return state_; }
   /// Zero: the trajectory needs no alignment of its start.

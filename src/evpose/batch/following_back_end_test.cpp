@@ -38,7 +38,10 @@ FusionConfig settings() {
 
 class Flight {
  public:
-  Flight(unsigned seed, double duration_s) : random_(seed), duration_s_(duration_s), parameters_(settings()) {
+  Flight(unsigned seed, double duration_s)
+      : random_(seed),
+        duration_s_(duration_s),
+        parameters_(settings(), StaticParameters::Shared::considered) {
     noise_.gyro_density = 2e-3, noise_.accel_density = 2e-2, noise_.gyro_walk = noise_.accel_walk = 1e-5;
     const FusionConfig config = settings();
     const CalibrationConfig& c = config.calibration;

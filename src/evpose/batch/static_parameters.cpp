@@ -7,11 +7,9 @@
 #include <numeric>
 #include <utility>
 
-#include "evpose/fusion/shared_errors.h"
-
 namespace evpose {
 
-StaticParameters::StaticParameters(const FusionConfig& config) {
+StaticParameters::StaticParameters(const FusionConfig& config, Shared shared) : shared_(shared) {
   const CalibrationConfig& c = config.calibration;
   std::vector<double> sigmas;
   const auto add = [&](bool asked, std::optional<int>* place, const Eigen::VectorXd& sigma) {

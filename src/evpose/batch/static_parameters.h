@@ -8,6 +8,7 @@
 
 #include "evpose/batch/chain_smoother.h"
 #include "evpose/fusion/back_end.h"
+#include "evpose/fusion/shared_errors.h"
 
 namespace evpose {
 
@@ -18,14 +19,16 @@ struct ParameterSolution {
 };
 
 /// What does not change over the recordings: errors of the calibration and offsets of map segments, which are
-/// estimated with the trajectories, and errors that all contours share (SharedErrors), which are considered:
-/// they add to the covariance alone. Each has a place among the parameters of the ChainSmoother. Those that
-/// are estimated have a present value about which everything is linearised, and a prior about what was given,
-/// which stays whatever the present value.
+/// estimated with the trajectories, and, where it is asked for, errors that all contours share
+/// (SharedErrors), which are considered: they add to the covariance alone. Each has a place among the
+/// parameters of the ChainSmoother. Those that are estimated have a present value about which everything is
+/// linearised, and a prior about what was given, which stays whatever the present value.
 class StaticParameters {
  public:
+  /// What to make of errors that all contours share.
+  enum class Shared { left_out, considered };
   /// As a resolved FusionConfig asks for them.
-  explicit StaticParameters(const FusionConfig& config);
+  explicit StaticParameters(const FusionConfig& config, Shared shared = Shared::left_out);
 
   int size() const { return size_; }
   /// First place of each; none: it is believed.
@@ -38,7 +41,14 @@ class StaticParameters {
   bool estimates_segments() const { return segments_config_.has_value(); }
   /// Of the shared errors, the first that counts: a delay of all events is one of the time offset where that
   /// is estimated.
-  int first_shared() const { return places_.time ? 1 : 0; }
+  int first_shared() const {
+    if (shared_ == Shared::left_out) return SharedErrors::kCount;
+    return places_.time ? 1 : 0;
+  }
+  /// No contour says anything of the rest.
+  bool takes_contours() const {
+    return places_.intrinsics || estimates_segments() || shared_ == Shared::considered;
+  }
   /// The calibration's parameters come first.
   int calibration_size() const { return calibration_size_; }
 
@@ -76,6 +86,7 @@ class StaticParameters {
  private:
   void state_prior(const CalibrationConfig& config, const std::vector<double>& sigmas);
 
+  Shared shared_;
   std::optional<SegmentOffsetConfig> segments_config_;
   Places places_;
   Eigen::VectorXd given_sigma_;              ///< of the calibration

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <utility>
 
-#include "evpose/calibrate/board_finder.h"
 #include "evpose/calibrate/calibration_words.h"
 #include "evpose/calibrate/data_sheet.h"
 #include "evpose/calibrate/joint_calibration.h"
@@ -20,50 +19,23 @@ namespace {
 
 constexpr double kRefuted = 5;  // given sigmas by which the events may contradict what was given
 
-const char* const kSearchBoard = "board";  // of --init
-
-/// The start where the map is a checkerboard and nobody says where it is; none: something else is given.
-Expected<std::optional<StartState>> searched_start(const TrackRequest& request) {
-  const bool asked = request.init == kSearchBoard;
-  if (!asked && request.init != "auto") return std::optional<StartState>();
-  const auto recording = open_recording(request.recording, request.calibration);
-  if (!recording) return recording.error();
-  if (!asked && (!recording->groundtruth_path.empty() || recording->initial_pose))
-    return std::optional<StartState>();
-  const auto map = load_map(request, *recording);
-  if (!map) return map.error();
-  const auto board = line_board(**map);
-  if (!board && !asked) return std::optional<StartState>();
-  if (!board)
-    return Error{"--init board", (*map)->source + " is no checkerboard", "give the start pose with --init"};
-  const auto camera = make_camera(recording->camera);
-  if (!camera) return Error{recording->calibration_path, camera.error().what, camera.error().fix};
-  const auto found = find_board(*recording, **map, *board, **camera);
-  if (!found) return found.error();
-  return std::optional(*found);
-}
-
-/// As --init takes it, with the errors of a pose that was found with a camera like a data sheet's.
-TrackRequest started_at(TrackRequest request, const StartState& start) {
-  constexpr double kOfDistance = 0.06, kRotation_deg = 3;
-  const Pose& T = start.T_map_body;
-  request.init =
-      text(T.p.x(), ",", T.p.y(), ",", T.p.z(), ",", T.q.x(), ",", T.q.y(), ",", T.q.z(), ",", T.q.w());
-  request.init_sigma = {kOfDistance * T.p.norm(), kRotation_deg};
-  return request;
+bool is_known(const CalibrationSigma& sigma, const Recording& recording) {
+  const bool mounting = sigma.of_rotation_rad().isZero(0) && sigma.of_translation_m().isZero(0);
+  return sigma.of_intrinsics(recording.camera).isZero(0) &&
+         (!recording.has_imu || (mounting && sigma.of_time_s() == 0));
 }
 
 Expected<TrackJob> job_of(const TrackRequest& request, const RunConfig& config) {
-  const auto start = searched_start(request);
-  if (!start) return start.error();
-  auto job = prepare(*start ? started_at(request, **start) : request, config);
+  auto job = prepare(request, config);
   if (!job) return job;
-  if (*start) job->start = **start;
   // It looks for a pose as the given calibration would see it; the alignment of the start looks for both.
   job->config.tracker.relocalization.on = false;
   Recording& recording = job->recording;
   recording.camera = with_distortion(recording.camera);
   const CalibrationSigma sigma = data_sheet_sigma(recording.calibration_sigma, recording.camera);
+  if (is_known(sigma, recording))
+    return Error{recording.calibration_path, "states that all of it is known",
+                 "leave out the sigmas that are zero, or give another one with --start"};
   recording.calibration_sigma = sigma;
   job->setup.intrinsics = recording.camera;
   job->setup.calibration_sigma = sigma;
@@ -78,6 +50,8 @@ Expected<std::vector<TrackJob>> jobs_of(const CalibrateRequest& request) {
   TrackRequest one = request.track;
   const auto config = load_config(one);
   if (!config) return config.error();
+  if (!config->tracker.fusion.calibration.on)
+    return Error{"fusion.calibration.on", "is false: nothing would be calibrated", "leave it out"};
   std::vector<TrackJob> jobs;
   for (const std::string& recording : request.recordings) {
     one.recording = recording;
@@ -162,9 +136,7 @@ Expected<Estimate> estimate(std::vector<TrackJob> jobs, const TrackRequest& requ
   if (auto ok = out.joint->estimate(request, progress); !ok) return ok.error();
   if (out.joint->interrupted()) return out;
   const auto found = run_calibration(out.joint->job(0), out.joint->found());
-  if (!found)
-    return Error{out.joint->job(0).recording.calibration_path, "states that all of it is known",
-                 "leave out the sigmas that are zero"};
+  EVPOSE_CHECK(found.has_value());
   out.calibration = *found;
   out.calibration.found.sigma.correlation = out.joint->correlation();
   return out;

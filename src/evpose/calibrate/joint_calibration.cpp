@@ -26,6 +26,13 @@ double share_of_tracking(std::span<const Update> updates) {
   return updates.empty() ? 0 : static_cast<double>(good) / static_cast<double>(updates.size());
 }
 
+/// Why poses are not `tracking`, as it was said last.
+std::string reason_of(std::span<const Update> updates) {
+  for (auto u = updates.rbegin(); u != updates.rend(); ++u)
+    if (u->health != Health::tracking && !u->reason.empty()) return u->reason;
+  return "their health is never told";
+}
+
 }  // namespace
 
 JointCalibration::JointCalibration(std::vector<TrackJob> jobs)
@@ -54,7 +61,7 @@ Status JointCalibration::begin_parameters() {
   choose_states(job.setup, *fusion);
   const auto coarse = coarse_camera(job);
   if (!coarse) return coarse.error();
-  parameters_ = std::make_shared<StaticParameters>(*fusion);
+  parameters_ = std::make_shared<StaticParameters>(*fusion, StaticParameters::Shared::considered);
   parameters_->add(*coarse);
   return {};
 }
@@ -143,8 +150,8 @@ Status JointCalibration::estimate(const TrackRequest& request, const Progress& p
     if (tracking_share(k) < kLeastTracking)
       return Error{jobs_[k].recording.folder,
                    text("with the best calibration found, ", std::lround(100 * tracking_share(k)),
-                        " % of the poses agree with the map: a wrong view was found"),
-                   "give a better start pose or focal length, or begin where more of the map is in view"};
+                        " % of the poses are tracking (", reason_of(flights_[k]->updates()), ")"),
+                   "give a better start pose or focal length, or a recording in which more of the map is in view"};
   return {};
 }
 

@@ -46,6 +46,8 @@ class FollowingBackEnd final : public BackEnd {
   void add_step(const Matrix15d& transition, double dt_s);
   void arrive();
   void add_contours(std::span<const ContourOffset> contours);
+  Eigen::Vector3d rate_over(std::size_t k, TimeNs to_each_side, double* dt_s) const;
+  double quick_share() const;
   Vector6d seen_pose_by_time() const;
   ChainMeasurement by_parameters() const;
 
@@ -61,6 +63,7 @@ class FollowingBackEnd final : public BackEnd {
   Eigen::Matrix<double, 15, 2> by_tilt_ = Eigen::Matrix<double, 15, 2>::Zero();
   JointMeasurement measurement_;
   ContourCallback contour_callback_;
+  double quick_share_ = 0;
   std::vector<int> places_;  ///< first parameter of each block of the measurement, by its id
 };
 

@@ -107,6 +107,8 @@ Expected<double> JointCalibration::pass(const Progress& progress) {
   ParameterSolution solution = parameters_->solve(told);
   double change = parameters_->change(solution);
   log_detail(text("calibration moves by ", change, " sigma"));
+  for (int i = 0; i < parameters_->calibration_size(); ++i)
+    log_detail(text("  number ", i, ": ", solution.z(i) / std::sqrt(solution.covariance(i, i)), " sigma"));
   const double share = share_of_step(solution);
   for (const auto& flight : flights_) change = std::max(change, flight->take(solution, share));
   solution.z *= share;

@@ -28,6 +28,8 @@ class StaticParameters {
   const Places& places() const { return places_; }
   Eigen::Index intrinsics_count() const { return intrinsics_count_; }
   bool estimates_segments() const { return segments_config_.has_value(); }
+  /// Only if it estimates them.
+  double segment_length_m() const { return segments_config_->length_m; }
   /// No contour says anything of the rest.
   bool takes_contours() const { return places_.intrinsics.has_value() || estimates_segments(); }
   /// The calibration's parameters come first.

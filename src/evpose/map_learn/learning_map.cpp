@@ -42,6 +42,11 @@ std::int32_t LearningMap::next_contour() const {
   return next;
 }
 
+void LearningMap::displace(const std::vector<Eigen::Vector3d>& displacements) {
+  for (std::size_t i = 0; i < displacements.size(); ++i)
+    map_.points[i].position += displacements[i].cast<float>();
+}
+
 void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
   for (const ContourPoint& p : points) {
     map_.points.push_back(p);
@@ -129,6 +134,8 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     if (verdict == Verdict::good) {
       take(e, unknowns[s], i);
       p.contrast = observed.map.points[i].contrast;
+    } else if (verdict == Verdict::untold && !record.was_told) {
+      p.position = record.given;
     }
     gone[i] = verdict == Verdict::wrong || (record.is_new && verdict == Verdict::untold);
     if (gone[i] && !record.is_new) struck_m_ += static_cast<double>(p.length);

@@ -104,6 +104,7 @@ Status FlightLearner::smooth() {
   }
   ++steps_done_;
   trajectory_ = estimator.trajectory();
+  learning_.displace(estimator.displacements());
   job_ = estimator.at_present_values();
   return {};
 }

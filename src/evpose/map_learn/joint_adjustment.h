@@ -15,7 +15,7 @@ struct Landmark {
   Eigen::Matrix<double, 3, 2> directions = Eigen::Matrix<double, 3, 2>::Zero();  ///< unit, map frame
   Eigen::Vector2d moved_m = Eigen::Vector2d::Zero();  ///< from where it was given to where it was seen
   Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();  ///< of where it was given
-  bool doubtful = true;  ///< it may stand on another edge altogether: the first sigma is that of the many
+  bool doubtful = true;  ///< it may stand on another edge or surface altogether: the sigmas are those of the many
 };
 
 /// What the events of one landmark said over a short time, at the present trajectory and place of it:
@@ -28,7 +28,8 @@ struct Observation {
   Eigen::Vector3d by_point = Eigen::Vector3d::Zero();  ///< px/m, map frame
   double offset_px = 0;
   double forward = 0;      ///< +1, -1: sense of the contour's motion; less where it is slow
-  double variance_px = 1;  ///< px^2
+  double variance_px2 = 1;  ///< as one of many: what lasts longer than one of them is counted in it
+  double scatter_px2 = 1;   ///< its own variance, by which it is judged
 };
 
 /// From one knot to the next: d_next = transition d - offset + noise.
@@ -42,7 +43,9 @@ struct KnotStep {
 /// knots.
 struct AdjustmentProblem {
   std::vector<KnotStep> steps;  ///< one less than there are knots
-  Vector15d start_sigma = Vector15d::Ones();
+  /// Of the first state, beside the recording: its error d has d + start_offset ~ N(0, start_covariance).
+  Matrix15d start_covariance = Matrix15d::Identity();
+  Vector15d start_offset = Vector15d::Zero();
   std::vector<Landmark> landmarks;
   std::vector<Observation> observations;  ///< those of a landmark together, in the order of their landmarks
   double delay_sigma_px = 0.05, own_delay_sigma_px = 0.08;

@@ -24,7 +24,8 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
     for (int i = 0; i < 15; ++i) step.offset(i) = 1e-3 * normal(random);
     p.steps.push_back(step);
   }
-  p.start_sigma.setConstant(0.1);
+  p.start_covariance *= 0.01;
+  for (int i = 0; i < 15; ++i) p.start_offset(i) = 1e-2 * std::sin(i);
   for (std::size_t j = 0; j < landmarks; ++j) {
     Landmark l;
     const Eigen::Vector3d tangent = vector(1).normalized();
@@ -42,7 +43,7 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
       o.by_point = vector(150);
       o.offset_px = normal(random);
       o.forward = i % 2 == 0 ? 1 : -1;
-      o.variance_px = 0.05;
+      o.variance_px2 = o.scatter_px2 = 0.05;
       p.observations.push_back(o);
     }
   }
@@ -66,7 +67,7 @@ struct Dense {
       J(0, at) = 1;
       add(J, Eigen::VectorXd::Constant(1, value), Eigen::MatrixXd::Constant(1, 1, 1 / (sigma * sigma)));
     };
-    for (int i = 0; i < 15; ++i) prior(i, 0, p.start_sigma(i));
+    for (int i = 0; i < 15; ++i) prior(i, -p.start_offset(i), std::sqrt(p.start_covariance(i, i)));
     for (int k = 0; k < static_cast<int>(p.steps.size()); ++k) {
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(15, H.rows());
       J.block<15, 15>(0, 15 * k) = -p.steps[static_cast<std::size_t>(k)].transition;
@@ -88,7 +89,7 @@ struct Dense {
       J.block<1, 6>(0, knot + 15) = o.share * o.by_pose.transpose();
       J(0, delay) = J(0, own + 2) = o.forward;
       J.block<1, 2>(0, own) = o.by_point.transpose() * l.directions;
-      add(J, Eigen::VectorXd::Constant(1, o.offset_px), Eigen::MatrixXd::Constant(1, 1, 1 / o.variance_px));
+      add(J, Eigen::VectorXd::Constant(1, o.offset_px), Eigen::MatrixXd::Constant(1, 1, 1 / o.variance_px2));
     }
   }
   int delay, landmarks;
@@ -146,7 +147,8 @@ Known make_consistent(AdjustmentProblem& p, unsigned seed, double noise_px) {
   }
   for (std::size_t k = 0; k + 1 < p.knots(); ++k)
     p.steps[k].offset = p.steps[k].transition * known.states[k] - known.states[k + 1];
-  p.start_sigma.setConstant(1);
+  p.start_covariance.setIdentity();
+  p.start_offset.setZero();
   for (Landmark& l : p.landmarks) {
     known.landmarks.emplace_back(2e-3 * normal(random), 0.5e-3 * normal(random));
     l.moved_m.setZero();
@@ -157,7 +159,7 @@ Known make_consistent(AdjustmentProblem& p, unsigned seed, double noise_px) {
         (1 - o.share) * known.states[o.knot].head<6>() + o.share * known.states[o.knot + 1].head<6>();
     const Eigen::Vector3d moved = p.landmarks[o.landmark].directions * known.landmarks[o.landmark];
     o.offset_px = o.by_pose.dot(pose) + o.by_point.dot(moved) + noise_px * normal(random);
-    o.variance_px = noise_px * noise_px;
+    o.variance_px2 = o.scatter_px2 = noise_px * noise_px;
   }
   return known;
 }

@@ -15,7 +15,8 @@ struct Landmark {
   Eigen::Matrix<double, 3, 2> directions = Eigen::Matrix<double, 3, 2>::Zero();  ///< unit, map frame
   Eigen::Vector2d moved_m = Eigen::Vector2d::Zero();  ///< from where it was given to where it was seen
   Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();  ///< of where it was given
-  bool doubtful = true;  ///< it may stand on another edge or surface altogether: the sigmas are those of the many
+  bool doubtful =
+      true;  ///< it may stand on another edge or surface altogether: the sigmas are those of the many
 };
 
 /// What the events of one landmark said over a short time, at the present trajectory and place of it:
@@ -27,7 +28,7 @@ struct Observation {
   Vector6d by_pose = Vector6d::Zero();
   Eigen::Vector3d by_point = Eigen::Vector3d::Zero();  ///< px/m, map frame
   double offset_px = 0;
-  double forward = 0;      ///< +1, -1: sense of the contour's motion; less where it is slow
+  double forward = 0;       ///< +1, -1: sense of the contour's motion; less where it is slow
   double variance_px2 = 1;  ///< as one of many: what lasts longer than one of them is counted in it
   double scatter_px2 = 1;   ///< its own variance, by which it is judged
 };

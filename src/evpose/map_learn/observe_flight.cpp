@@ -14,8 +14,8 @@ namespace {
 constexpr TimeNs kKnot = 100 * kNsPerMs;
 constexpr TimeNs kBin = 50 * kNsPerMs;  // events of a landmark that become one observation
 constexpr double kEvent_px = 0.4;       // scatter of a contour's events about it
-constexpr double kLasting_px = 0.15;     // of what the events of a bin share
-constexpr double kMemory_s = 0.5;        // for so long the next ones share it, too
+constexpr double kLasting_px = 0.15;    // of what the events of a bin share
+constexpr double kMemory_s = 0.15;      // for so long the next ones share it, too
 constexpr double kLeastWeight = 4;      // events, below which a bin says nothing
 constexpr double kSlow_px_s = 20;       // below this flow the edge's delay fades out (design 5.2)
 

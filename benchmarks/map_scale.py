@@ -131,7 +131,28 @@ def measure_city(bench, million):
                 f"{merge_peak / 1e6:.0f}", f"{merged.stat().st_size / 1e6:.0f}", same]
 
 
+def dated(table):
+    """Each table says of itself when it was made, since they are made one by one."""
+    return [f"At commit {harness.commit()}{harness.machine()}:", "", *table]
+
+
+def cities(bench):
+    """The table's rows, each a figure of its own that is kept; yields the table as far as it is made."""
+    if not shutil.which("parallel"):
+        yield ["GNU parallel was not there."]
+        return
+    rows = []
+    for million in CITY_MILLIONS[:1] if bench.quick else CITY_MILLIONS:
+        rows.append(bench.once(f"map-scale: city of {million} million", lambda: measure_city(bench, million)))
+        yield tables.table(
+            ["points", "tiles", "largest, million points", "plan s", "MB", "jobs and merge: processor s", "s per million",
+             "elapsed s", "slowest job s", "largest job MB", "merge s", "MB", "map MB", "bytes of one run"], rows)
+
+
 def make(bench):
+    for table in cities(bench):  # the largest takes most of an hour: the page has the others by then
+        page = bench.write_page("map-scale", {"city": dated(table)})
+        print(f"  {page}: {len(table) - 2} cities", flush=True)
     rows = [bench.once(f"map-scale: {million} million", lambda: measure(bench, million))
             for million in (MILLIONS[:1] if bench.quick else MILLIONS)]
     ours = tables.table(["points", "tiles", "processor s", "s per million", "elapsed s", "peak memory MB", "bytes per point"],
@@ -139,12 +160,5 @@ def make(bench):
     beside = [row["beside"] for row in rows if row["beside"]]
     peer = tables.table(["points", "neighbours", "ours: normals s", "planes s", "peak MB, whole build", "PCL: normals s",
                          "regions s", "peak MB", "regions, share of the points"], beside)
-    cities = ["GNU parallel was not there."]
-    if shutil.which("parallel"):
-        cities = tables.table(
-            ["points", "tiles", "largest, million points", "plan s", "MB", "jobs and merge: processor s", "s per million",
-             "elapsed s", "slowest job s", "largest job MB", "merge s", "MB", "map MB", "bytes of one run"],
-            [bench.once(f"map-scale: city of {million} million", lambda: measure_city(bench, million))
-             for million in (CITY_MILLIONS[:1] if bench.quick else CITY_MILLIONS)])
-    return bench.write_page("map-scale", {"ours": ours, "PCL": peer if beside else ["PCL (libpcl-dev) was not there."],
-                                          "city": cities}, harness.machine())
+    made = {"ours": dated(ours), **({"PCL": dated(peer)} if beside else {})}  # without PCL its old figures stay
+    return bench.write_page("map-scale", made)

@@ -94,8 +94,8 @@ Status check(int columns, int rows, std::initializer_list<NamedLength> lengths) 
     if (!(length_m > 0) || !std::isfinite(length_m))
       return Error{"board", text(name, ": ", length_m, " m is no length"), text("give ", name, " in metres")};
     if (length_m > kLongest_m)
-      return Error{"board", text(name, " is ", length_m, " m: centimetres or millimetres?"),
-                   text("give ", name, " in metres")};
+      return Error{"board", text(name, ": ", length_m, " m is longer than that of any board"),
+                   text("give ", name, " in metres, not millimetres")};
   }
   return {};
 }

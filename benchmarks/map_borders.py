@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/results/map-borders.md: a flight along a street whose map is built in tiles and read by place.
+"""docs/results/map-borders.md: a flight along a corridor whose map is built in tiles and read by place.
 
-The street's LiDAR cloud is set beside itself twice, so that parts of the map come and go on the way, and built in tiles of
-half a million points as well as in one. The simulated flight of 60 m passes the borders of tiles and the place where the next
-part of the map is taken over. Steps are changes of the position's error from one update to the next.
+The corridor's LiDAR cloud is set one behind the other, so that parts of the map come and go on the way, and built in tiles as
+well as in one piece. The simulated flight passes the borders of tiles and the place where the next part of the map is taken
+over. Steps are changes of the position's error from one update to the next.
 """
 import re
 import shutil
+import sys
 
 import numpy as np
 
@@ -14,28 +15,36 @@ import files
 import harness
 import tables
 
-SPEED_M_S, WAY_M = 6, 60
-COPIES_M = (-165, 0, 165)  # along the street, which is 160 m long
-TILE_POINTS = 500_000
+sys.path.insert(0, str(harness.ROOT / "tests/end_to_end"))
+from corridor import corridor  # noqa: E402
+
+LENGTH_M, SPEED_M_S, WAY_M = 70, 5, 55
+COPIES = range(-2, 3)
+PITCH_M = LENGTH_M + 5
+TILE_POINTS = 100_000
 NEAR_S = 0.2  # of a border
 TAKEN_OVER_M = 40  # from where the map was read first; docs/use/map.md
 SCENARIO = f"""
-world: {{kind: canyon}}
+scene_file: scene.yaml
+duration_s: {WAY_M / SPEED_M_S}
 camera: {{size: custom, width: 320, height: 240, focal_px: 190}}
-trajectory: {{kind: traverse, centre_x_m: 50, centre_y_m: 0, centre_z_m: 3, size_forward_m: {WAY_M}, size_left_m: 3,
-  size_up_m: 1, speed_m_s: {SPEED_M_S}}}
-lidar: {{on: true, flight: {{kind: traverse, duration_s: -1, centre_x_m: 50, centre_y_m: 0, centre_z_m: 3, size_forward_m: 80,
-  size_left_m: 3, size_up_m: 1, speed_m_s: 4}}}}
+imu: {{rate_hz: 400}}
+trajectory: {{kind: traverse, centre_x_m: {2 + WAY_M / 2}, centre_y_m: 0, centre_z_m: 1.5, size_forward_m: {WAY_M},
+  size_left_m: 1, size_up_m: 0.5, speed_m_s: {SPEED_M_S}}}
+lidar: {{on: true, flight: {{kind: traverse, duration_s: 30, centre_x_m: {LENGTH_M / 2}, centre_y_m: 0, centre_z_m: 1.5,
+  size_forward_m: {LENGTH_M - 6}, size_left_m: 1, size_up_m: 0.5, speed_m_s: 4}}}}
 """
 
 
 def simulated(bench):
-    folder = bench.scratch / "recordings" / f"street-{harness.digest(SCENARIO)[:8]}"
+    scene = corridor(LENGTH_M)
+    folder = bench.scratch / "recordings" / f"corridor-{harness.digest(SCENARIO + scene)[:8]}"
     if not folder.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
-        scenario = folder.with_suffix(".yaml")
-        scenario.write_text(SCENARIO)
-        bench.run("simulate", scenario, "-o", folder, "--duration", WAY_M / SPEED_M_S)
+        with bench.folder() as scratch:
+            (scratch / "scene.yaml").write_text(scene)
+            (scratch / "flight.yaml").write_text(SCENARIO)
+            bench.run("simulate", scratch / "flight.yaml", "-o", folder)
     return folder
 
 
@@ -60,7 +69,8 @@ def numbers(words):
 
 def crossings(truth, cores):
     """Times at which the way passes from one tile to another."""
-    inside = ((truth[:, None, 1:3] >= cores[:, :2]) & (truth[:, None, 1:3] < cores[:, 2:])).argmax(1).argmax(1)
+    places = truth[:, None, 1:3]
+    inside = ((places >= cores[:, :2]) & (places < cores[:, 2:])).all(2).argmax(1)
     return truth[1:, 0][np.diff(inside) != 0]
 
 
@@ -81,8 +91,9 @@ def measure(bench):
     recording = simulated(bench)
     with bench.folder() as scratch:
         points = files.Ply(recording / "map_raw.ply").points().astype("<f4")
-        cloud = scratch / "street.ply"
-        files.write_points(cloud, (points + np.array([x, 0, 0], "<f4") for x in COPIES_M), len(points) * len(COPIES_M))
+        cloud = scratch / "cloud.ply"
+        copies = (points + np.array([PITCH_M * k, 0, 0], "<f4") for k in COPIES)
+        files.write_points(cloud, copies, len(points) * len(COPIES))
         merged, one, cores = built(bench, cloud, scratch)
         truth = np.loadtxt(recording / "groundtruth.tum")
         borders = crossings(truth, cores)
@@ -98,7 +109,7 @@ def measure(bench):
             rows.append([name, f"{100 * summary['tracking_share']:.0f}", f"{summary['resources']['peak_memory_mb']:.0f}",
                          *judged(run, truth, [*borders, taken_over])])
         by_place, whole, _ = kept.values()
-        return {"points": len(points) * len(COPIES_M), "tiles": len(cores), "borders": [round(float(t), 2) for t in borders],
+        return {"points": len(points) * len(COPIES), "tiles": len(cores), "borders": [round(float(t), 2) for t in borders],
                 "taken_over": round(float(taken_over), 2), "same": by_place == whole, "rows": rows}
 
 

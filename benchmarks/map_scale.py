@@ -26,7 +26,6 @@ import tables
 MILLIONS = [0.1, 1, 10]
 PCL_MILLIONS = 1  # and no more: it has no tiles
 CITY_MILLIONS = [1, 10, 100]
-COMPARED_MILLIONS = 10  # and no more: these are built in one run, too
 CITY_PITCH_M = 44
 PCL_MODULES = ["pcl_features", "pcl_segmentation", "pcl_io", "pcl_search"]
 
@@ -120,15 +119,11 @@ def measure_city(bench, million):
         script = harness.ROOT / "examples/map_tiles_parallel.sh"
         _, spent, elapsed, peak = measured(["bash", script, cloud, tiles, merged], path=bench.evpose.parent)
         _, _, merge_s, merge_peak = measured([bench.evpose, "-q", "map", "merge", tiles, "-o", merged])
-        same = "not tried"
-        if million <= COMPARED_MILLIONS:
-            bench.run("map", "build", cloud, "-o", scratch / "one.h5")
-            same = "yes" if (scratch / "one.h5").read_bytes() == merged.read_bytes() else "NO"
         jobs = [line.split("\t") for line in (tiles / "jobs.log").read_text().splitlines()[1:]]
         slowest = max(float(job[3]) for job in jobs)
         return [count, number, f"{float(largest) / 1e6:.1f}", f"{plan_s:.0f}", f"{plan_peak / 1e6:.0f}", f"{spent:.0f}",
                 f"{spent / million:.1f}", f"{elapsed:.0f}", f"{slowest:.0f}", f"{peak / 1e6:.0f}", f"{merge_s:.0f}",
-                f"{merge_peak / 1e6:.0f}", f"{merged.stat().st_size / 1e6:.0f}", same]
+                f"{merge_peak / 1e6:.0f}", f"{merged.stat().st_size / 1e6:.0f}"]
 
 
 def dated(table):
@@ -146,7 +141,7 @@ def cities(bench):
         rows.append(bench.once(f"map-scale: city of {million} million", lambda: measure_city(bench, million)))
         yield tables.table(
             ["points", "tiles", "largest, million points", "plan s", "MB", "jobs and merge: processor s", "s per million",
-             "elapsed s", "slowest job s", "largest job MB", "merge s", "MB", "map MB", "bytes of one run"], rows)
+             "elapsed s", "slowest job s", "largest job MB", "merge s", "MB", "map MB"], rows)
 
 
 def make(bench):

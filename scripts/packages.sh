@@ -47,6 +47,7 @@ test=(
   python3-tf2-msgs     # drive it
   ffmpeg               # encodes films of a run
   parallel             # builds the tiles of a map, as the example does
+  g++-aarch64-linux-gnu qemu-user-static  # kernels for vectors on 64-bit ARM
   clang-14 libclang-rt-14-dev  # fuzzing
   chromium             # draws the report
   clang-format-14      # pinned: each version formats differently

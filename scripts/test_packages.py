@@ -70,6 +70,13 @@ class System:
         return (self.folder / path).read_bytes()
 
 
+def trust_for_npm(folder):
+    """npm believes whom this machine believes: where a proxy stands before the registry, the rest knows nothing of it."""
+    shutil.copy("/etc/ssl/certs/ca-certificates.crt", folder / "npm_ca.crt")
+    (folder / "npmrc").write_text("cafile=/opt/npm_ca.crt\n")
+    return {folder / "npm_ca.crt": "/opt/npm_ca.crt", folder / "npmrc": "/root/.npmrc"}
+
+
 def ccache_folder():
     """Empty: it keeps nothing here."""
     folder = run("ccache", "--get-config", "cache_dir").strip() if shutil.which("ccache") else ""
@@ -133,7 +140,9 @@ class Buildah:
             self("tag", names[0], name)
 
     def build(self, context, image, *more):
-        kept = ["--volume", f"{ccache_folder()}:/root/.cache/ccache"] if ccache_folder() else []
+        seen = {ccache_folder(): "/root/.cache/ccache"} if ccache_folder() else {}
+        seen.update(trust_for_npm(context.parent))
+        kept = [word for here, there in seen.items() for word in ("--volume", f"{here}:{there}")]
         self("bud", "--isolation", "chroot", "--pull-never", *kept, "--build-arg", f"SOURCE_DATE_EPOCH={source_date()}",
              "--file", context / "docker/Dockerfile", "--tag", image, *more, context)
 
@@ -170,6 +179,8 @@ def made_in_folder(archive, scratch, held):
     """The same without the Dockerfile."""
     system = unpacked(archive, scratch / "build")
     unpack_sources(system.folder / "evpose")
+    for here, there in trust_for_npm(scratch).items():
+        shutil.copy(here, system.folder / there[1:])
     system.run("sh", "-ec", "cd /evpose && scripts/make_debs.sh", SOURCE_DATE_EPOCH=source_date())
     yield system
 

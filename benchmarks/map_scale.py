@@ -114,11 +114,11 @@ def measure_city(bench, million):
         cloud, tiles, merged = scratch / "city.ply", scratch / "tiles", scratch / "city.h5"
         hall = files.Ply(bench.shared / "data/real/clouds/hall_lidar_4cm.ply").points().astype("<f4")
         files.write_points(cloud, city(hall, count), count)
-        said, _, plan_s, plan_peak = measured([bench.evpose, "-q", "map", "build", cloud, "--plan", tiles])
+        said, plan_s, _, plan_peak = measured([bench.evpose, "-q", "map", "build", cloud, "--plan", tiles])
         number, largest = re.search(r"tiles +(\d+) of up to (\d+) points", said).groups()
         script = harness.ROOT / "examples/map_tiles_parallel.sh"
         _, spent, elapsed, peak = measured(["bash", script, cloud, tiles, merged], path=bench.evpose.parent)
-        _, _, merge_s, merge_peak = measured([bench.evpose, "-q", "map", "merge", tiles, "-o", merged])
+        _, merge_s, _, merge_peak = measured([bench.evpose, "-q", "map", "merge", tiles, "-o", merged])
         jobs = [line.split("\t") for line in (tiles / "jobs.log").read_text().splitlines()[1:]]
         slowest = max(float(job[3]) for job in jobs)
         return [count, number, f"{float(largest) / 1e6:.1f}", f"{plan_s:.0f}", f"{plan_peak / 1e6:.0f}", f"{spent:.0f}",
@@ -140,8 +140,8 @@ def cities(bench):
     for million in CITY_MILLIONS[:1] if bench.quick else CITY_MILLIONS:
         rows.append(bench.once(f"map-scale: city of {million} million", lambda: measure_city(bench, million)))
         yield tables.table(
-            ["points", "tiles", "largest, million points", "plan s", "MB", "jobs and merge: processor s", "s per million",
-             "elapsed s", "slowest job s", "largest job MB", "merge s", "MB", "map MB"], rows)
+            ["points", "tiles", "largest, million points", "plan: processor s", "MB", "jobs and merge: processor s", "s per million",
+             "elapsed s", "slowest job s", "largest job MB", "merge: processor s", "MB", "map MB"], rows)
 
 
 def make(bench):

@@ -69,7 +69,8 @@ Expected<std::vector<TimedPose>> read_truth(const std::string& path) {
   const auto recording = open_recording(path);
   if (!recording) return recording.error();
   if (recording->groundtruth_path.empty())
-    return Error{path, "the recording has no ground truth", "give a recording that has, or a trajectory's file"};
+    return Error{path, "the recording has no ground truth",
+                 "give a recording that has, or a trajectory's file"};
   return read_groundtruth(*recording);
 }
 
@@ -107,8 +108,13 @@ void add_eval(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand("eval", "Judge a trajectory against ground truth");
   const auto request = std::make_shared<EvalRequest>();
   EvalRequest& r = *request;
-  command->add_option("estimate", r.estimate, "run folder, or a trajectory: TUM, EuRoC or KITTI file, or a bag")->required();
-  command->add_option("groundtruth", r.truth, "recording with ground truth, or a trajectory of the same frame and body")->required();
+  command
+      ->add_option("estimate", r.estimate, "run folder, or a trajectory: TUM, EuRoC or KITTI file, or a bag")
+      ->required();
+  command
+      ->add_option("groundtruth", r.truth,
+                   "recording with ground truth, or a trajectory of the same frame and body")
+      ->required();
   command->add_option("--align", r.alignment, "what is fitted before errors are taken")
       ->check(CLI::IsMember(names(kAlignments)))
       ->capture_default_str();

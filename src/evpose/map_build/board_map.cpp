@@ -111,7 +111,8 @@ Expected<ContourMap> map_of(const Checkerboard& b) {
 }
 
 Expected<ContourMap> map_of(const AprilGrid& b) {
-  if (auto ok = check(b.columns, b.rows, {{"--tag", b.tag_m}, {"--spacing", b.spacing}}); !ok) return ok.error();
+  if (auto ok = check(b.columns, b.rows, {{"--tag", b.tag_m}, {"--spacing", b.spacing}}); !ok)
+    return ok.error();
   Sheet sheet;
   const double gap = b.spacing * b.tag_m, step = b.tag_m + gap;
   const Place corner = -0.5 * (step * Place(b.columns, b.rows) - Place(gap, gap));
@@ -125,7 +126,8 @@ Expected<ContourMap> map_of(const AprilGrid& b) {
 }
 
 Expected<ContourMap> map_of(const CircleGrid& b) {
-  if (auto ok = check(b.columns, b.rows, {{"--distance", b.distance_m}, {"--diameter", b.diameter_m}}); !ok) return ok.error();
+  if (auto ok = check(b.columns, b.rows, {{"--distance", b.distance_m}, {"--diameter", b.diameter_m}}); !ok)
+    return ok.error();
   const double nearest = b.shifted ? std::numbers::sqrt2 * b.distance_m : b.distance_m;
   if (!(b.diameter_m < nearest))
     return Error{"board", text("discs of ", b.diameter_m, " m at ", nearest, " m touch each other"),

@@ -96,7 +96,7 @@ def bare_system(name, scratch):
         untrusted = [f'--aptopt={option} "true"' for option in
                      ("Acquire::AllowInsecureRepositories", "APT::Get::AllowUnauthenticated")]
         run("mmdebstrap", "--quiet", "--variant=extract", "--include=ubuntu-keyring", *untrusted, release, scratch / "keys")
-        ring, key, home = (scratch / part for part in ("keys/usr/share/keyrings/ubuntu-archive-keyring.gpg", "key", "gpg"))
+        ring, key, home = (scratch / part for part in ("keys/usr/share/keyrings/ubuntu-archive-keyring.gpg", "ubuntu.gpg", "gpg"))
         home.mkdir(mode=0o700)
         run("gpg", "--quiet", "--homedir", home, "--no-default-keyring", "--keyring", ring, "--output", key,
             "--export", UBUNTU_KEY)
@@ -294,6 +294,7 @@ def tried(name):
     held = Held()
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
+        scratch.chmod(0o755)  # apt reads keys as another user
         archive = bare_system(name, scratch)
         with (made_by_dockerfile if name == DEBIAN else made_in_folder)(archive, scratch, held) as maker:
             debs, wheel = taken(maker, scratch / "made", held)

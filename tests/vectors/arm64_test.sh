@@ -12,12 +12,12 @@ done
 mkdir -p "$build"
 compiler=(aarch64-linux-gnu-g++)
 if command -v ccache >/dev/null; then compiler=(ccache "${compiler[@]}"); fi
-objects=()
+objects=() jobs=()
 compile() {  # OBJECT SOURCE FLAGS...
   local object=$build/$1.o file=$2
   shift 2
-  "${compiler[@]}" -std=c++20 -march=armv8-a -isystem $googletest/include "$@" -c "$file" -o "$object"
-  objects+=("$object")
+  "${compiler[@]}" -std=c++20 -march=armv8-a -isystem $googletest/include "$@" -c "$file" -o "$object" &
+  jobs+=($!) objects+=("$object")
 }
 for name in core/error core/log io/events/decode_faults io/events/evt2 io/events/evt3 io/events/evt_test sim/world/texture \
   sim/world/lanes_test; do
@@ -26,5 +26,6 @@ done
 for name in gtest-all gtest_main; do
   compile $name $googletest/src/$name.cc -I$googletest
 done
+for job in "${jobs[@]}"; do wait "$job"; done
 aarch64-linux-gnu-g++ -static "${objects[@]}" -o "$build/vectors_test"
 qemu-aarch64-static "$build/vectors_test"

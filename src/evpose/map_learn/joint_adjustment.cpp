@@ -183,7 +183,6 @@ void Adjuster::reweight() {
   }
   for (std::size_t j = 0; j < p_.landmarks.size(); ++j) {
     const Landmark& l = p_.landmarks[j];
-    if (!l.doubtful) continue;
     for (int d = 0; d < 2; ++d)
       prior_weights_[j](d) = robust_weight((l.moved_m(d) + moves_[j](d)) / l.sigma_m(d));
   }

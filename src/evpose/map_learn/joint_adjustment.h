@@ -14,9 +14,8 @@ namespace evpose::map_learn {
 struct Landmark {
   Eigen::Matrix<double, 3, 2> directions = Eigen::Matrix<double, 3, 2>::Zero();  ///< unit, map frame
   Eigen::Vector2d moved_m = Eigen::Vector2d::Zero();  ///< from where it was given to where it was seen
-  Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();  ///< of where it was given
-  bool doubtful =
-      true;  ///< it may stand on another edge or surface altogether: the sigmas are those of the many
+  /// Of where it was given: that of the many, since it may stand on another edge or surface altogether.
+  Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();
 };
 
 /// What the events of one landmark said over a short time, at the present trajectory and place of it:
@@ -73,7 +72,7 @@ struct AdjustmentResult {
   std::vector<Matrix6d> pose_covariances;  ///< at the knots
 };
 
-/// Weighted least squares; observations and the places of doubtful landmarks count less the further they lie
+/// Weighted least squares; observations and the places of landmarks count less the further they lie
 /// off (solved again with new weights, `reweightings` times). Deterministic. `R_map_body`: at the knots.
 AdjustmentResult adjust(const AdjustmentProblem& problem, const std::vector<Eigen::Matrix3d>& R_map_body,
                         int reweightings = 6);

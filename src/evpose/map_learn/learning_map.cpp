@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/fusion/fusion_config.h"
+
 namespace evpose::map_learn {
 namespace {
 
 // Of what a cloud's map says of a contour, beside the sigma that it states.
-constexpr double kContour_m =
-    6e-3;  // as in flight (SegmentOffsetConfig); some stand on another edge, and count less
+constexpr double kContour_m = SegmentOffsetConfig{}.sigma_m;  // some stand on another edge, and count less
 // Of a marking: nothing is known along its plane; across it some faces stand further off.
 constexpr double kAlongPlane_m = 0.1, kOffPlane_m = 1e-3;
 // What is not in the adjustment's covariance: light and shade beside an edge, a tangent that leans.

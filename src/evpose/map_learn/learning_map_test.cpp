@@ -143,7 +143,6 @@ TEST(LearningMap, ANewMarkingIsFreeAlongItsPlaneAndOneOfAnEarlierFlightIsHeldByI
   segments = cut_into_segments(second.map());
   const Landmark held = second.landmarks(segments)[segments.of_point[25]];
   EXPECT_NEAR(held.sigma_m(0), static_cast<double>(second.map().points[25].sigma), 1e-9);
-  EXPECT_TRUE(held.doubtful);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/images/viewer_run.png, viewer_live.png, report_desktop.png, report_phone.png: the pages of `evpose view` and
-`evpose serve --view` of room_spiral, and the first screens of its report."""
+`evpose serve --view` of room_spiral, and the first two screens of its report."""
 import signal
 import socket
 import subprocess
@@ -58,11 +58,11 @@ def shoot(bench, browser, output, words, ready, script=""):
 
 
 def shoot_report(bench, browser, report):
-    for name, width, height, mobile in (("desktop", WIDTH, HEIGHT, False), ("phone", 390, 844, True)):
+    for name, width, height, mobile in (("desktop", WIDTH, 1620, False), ("phone", 390, 1300, True)):
         page = browser.open(report.resolve().as_uri(), width, height, mobile)
         if not page.wait_for("document.documentElement?.dataset.ready"):
             raise harness.Failure(f"{report} is never ready")
-        page.screenshot(bench.image(f"report_{name}.png"))
+        page.screenshot(bench.image(f"report_{name}.png"), whole=False)
         page.close()
 
 
@@ -73,7 +73,8 @@ def make(bench):
     recording = bench.peer("room_spiral")
     map_words = ["--map", recording.contours, "--occluders", recording.mesh]
     bench.scratch.mkdir(parents=True, exist_ok=True)
-    run = bench.scratch / "viewer"
+    run = bench.scratch / "viewer" / recording.name
+    run.parent.mkdir(exist_ok=True)
     bench.run("track", recording.folder, *map_words, "--init", "groundtruth", "-o", run, "--force")
     output = bench.image("viewer_run.png")
     with chromium.Browser(name) as browser:

@@ -1,6 +1,6 @@
 set(EVPOSE_TEST_TIMEOUT 300)
 if(CMAKE_CROSSCOMPILING)  # an emulator is some twenty times slower
-  set(EVPOSE_TEST_TIMEOUT 1800)
+  set(EVPOSE_TEST_TIMEOUT 600)
 endif()
 
 # evpose_module(NAME SOURCES ... [LINKS ...] [PRIVATE_LINKS ...] [TESTS ...])

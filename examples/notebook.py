@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # %% [markdown]
 # # A flight in a notebook
-# Reads a recording and its map, tracks it, looks at the result, starts from a poor pose, and feeds a tracker piece by
-# piece. Jupytext, VS Code and Spyder open this file as a notebook; it also runs as it is:
+# Reads a recording and its map, tracks it, looks at the result, finds its pose from a poor start, smooths it,
+# and feeds a tracker piece by piece. Jupytext, VS Code and Spyder open this file as a notebook; it also runs as it is:
 # `EVPOSE_RECORDING=flight python3 examples/notebook.py`. Needs numpy, matplotlib and the module `evpose`.
 
 # %%
@@ -113,8 +113,21 @@ def quaternion(T):
 
 beside = np.array([0.02, -0.02, 0.01])
 words = ",".join(f"{v:.6f}" for v in (*(start[:3, 3] + beside), *quaternion(start))) + f"@{1e-9 * at:.6f}"
-searched = evpose.track(RECORDING, OUTPUT / "searched", map=map_path, init=words, init_sigma=(0.03, 1), replace=True)
-print(f"from {1e3 * np.linalg.norm(beside):.0f} mm beside: {searched.summary['status']}")
+found = evpose.relocalise(RECORDING, words, (0.03, 1), map=map_path)
+off = found.position - [np.interp(found.t_ns, truth_ns, truth[:, axis, 3]) for axis in range(3)]
+print(f"from {1e3 * np.linalg.norm(beside):.0f} mm beside: {found.health} after {1e-6 * (found.t_ns - at):.0f} ms, "
+      f"{1e3 * np.linalg.norm(off):.1f} mm off")
+
+# %% [markdown]
+# ## Afterwards: all data at once
+# `smooth` estimates the whole trajectory from past and future data.
+
+# %%
+smoothed = evpose.smooth(RECORDING, OUTPUT / "smoothed", map=map_path, replace=True)
+for name, judged in (("tracked", run), ("smoothed", smoothed)):
+    truth_at = np.stack([np.interp(judged.t_ns, truth_ns, truth[:, axis, 3]) for axis in range(3)], 1)
+    error_m = np.linalg.norm(judged.T_map_body[judged.valid, :3, 3] - truth_at[judged.valid], axis=1)
+    print(f"{name}: {1e3 * error_m.mean():.1f} mm in the mean")
 
 # %% [markdown]
 # ## Piece by piece

@@ -7,7 +7,9 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 
+#include "evpose/batch/smooth_recording.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/report/csv_table.h"
 #include "evpose/report/run_files.h"
@@ -64,30 +66,88 @@ py::object summary_of(const RunFiles& run) {
   return py::module_::import("json").attr("loads")(*content);
 }
 
-RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
-               const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
-               const std::map<std::string, py::object>& settings, bool replace) {
+using Settings = std::map<std::string, py::object>;
+
+TrackRequest request_of(const fs::path& recording, const fs::path& map, const fs::path& calibration,
+                        const fs::path& occluders, const std::string& init,
+                        const std::pair<double, double>& init_sigma, const Settings& settings) {
   TrackRequest request;
   request.recording = recording.string();
-  request.output = output.string();
   request.map = map.string();
   request.calibration = calibration.string();
   request.occluders = occluders.string();
   request.init = init;
   request.init_sigma = {init_sigma.first, init_sigma.second};
   for (const auto& [key, setting] : settings) request.assignments.push_back(key + "=" + setting_text(setting));
-  request.replace = replace;
+  return request;
+}
+
+/// What `work` makes of the request; other threads of Python run meanwhile, and Ctrl-C ends it.
+auto worked(TrackRequest request, auto&& work) {
   request.interrupted = [] {
     const py::gil_scoped_acquire acquire;
     return PyErr_CheckSignals() != 0;
   };
   auto outcome = [&] {
     const py::gil_scoped_release release;
-    return track_recording(request);
+    return work(request);
   }();
   if (PyErr_Occurred() != nullptr) throw py::error_already_set();
-  value_of(std::move(outcome));
+  return value_of(std::move(outcome));
+}
+
+RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
+               const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
+               const Settings& settings, bool replace) {
+  TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
+  request.output = output.string();
+  request.replace = replace;
+  worked(request, track_recording);
   return value_of(read_run_files(output.string()));
+}
+
+RunFiles smooth(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
+                const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
+                const Settings& settings, bool replace) {
+  TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
+  request.output = output.string();
+  request.replace = replace;
+  worked(request, smooth_recording);
+  return value_of(read_run_files(output.string()));
+}
+
+/// The first update that is `tracking`, or the last one within the time.
+Expected<Update> find_pose(const TrackRequest& request, double within_s) {
+  const auto config = load_config(request);
+  if (!config) return config.error();
+  const auto job = prepare(request, *config);
+  if (!job) return job.error();
+  auto tracker = Tracker::create(job->setup, job->config.tracker, job->start);
+  if (!tracker) return tracker.error();
+  std::optional<Update> last;
+  bool found = false;
+  (*tracker)->on_update([&](const Update& u) {
+    if (found) return;
+    last = u;
+    found = u.health == Health::tracking;
+  });
+  const TimeNs end = job->start.t + from_seconds(within_s);
+  const auto go_on = [&](double) {
+    return !found && (!last || last->t < end) && !(request.interrupted && request.interrupted());
+  };
+  if (const auto ok = feed_recording(job->recording, job->config, **tracker, go_on); !ok) return ok.error();
+  if (!last)
+    return Error{request.recording, "the streams end before the first update",
+                 "check that events and IMU cover the start"};
+  return *last;
+}
+
+Update relocalise(const fs::path& recording, const std::string& init, const std::pair<double, double>& init_sigma,
+                  const fs::path& map, const fs::path& calibration, const fs::path& occluders, double within_s,
+                  const Settings& settings) {
+  if (!(within_s > 0 && within_s < 1e6)) throw py::value_error("within_s: give seconds, more than 0");
+  return worked(request_of(recording, map, calibration, occluders, init, init_sigma, settings),
+                [&](const TrackRequest& request) { return find_pose(request, within_s); });
 }
 
 }  // namespace
@@ -127,10 +187,17 @@ void bind_runs(py::module_& m) {
       .def_property_readonly("summary", &summary_of, "what summary.json says")
       .def("table", &table_of, "file"_a = "states.csv",
            "Columns of numbers of states.csv, states_imu.csv, calibration.csv or latency.csv, by name");
+  const auto known = std::pair<double, double>(0, 0);
   m.def("track", &track, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
-        "init"_a = "auto", "init_sigma"_a = std::pair<double, double>(0, 0),
-        "settings"_a = std::map<std::string, py::object>{}, "replace"_a = false,
+        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
         "What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched first");
+  m.def("smooth", &smooth, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
+        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
+        "What evpose smooth does: the trajectory from all data, past and future");
+  m.def("relocalise", &relocalise, "recording"_a, "init"_a, "init_sigma"_a, "map"_a = "", "calibration"_a = "",
+        "occluders"_a = "", "within_s"_a = 1.0, "settings"_a = Settings{},
+        "The pose near a rough one (x,y,z,qx,qy,qz,qw[@t_s]; init_sigma: m and deg per axis) that the events confirm: "
+        "the first update whose health is tracking; without one, the last after within_s seconds of data");
 }
 
 }  // namespace evpose

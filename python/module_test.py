@@ -146,6 +146,28 @@ class ModuleTest(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "no run folder"):
             evpose.Run("nowhere")
 
+    def test_a_rough_pose_is_confirmed_by_the_events(self):
+        words = "0,0.01,1.01,0,0,0,1@0"
+        found = evpose.relocalise(self.folder, words, (0.02, 1))
+        self.assertEqual(found.health, "tracking")
+        self.assertLess(found.t_ns, 500_000_000)
+        self.assertLess(np.linalg.norm(found.position - position(found.t_ns * 1e-9)), 0.02)
+        self.assertEqual(found.covariance.shape, (6, 6))
+        early = evpose.relocalise(self.folder, words, (0.02, 1), within_s=0.01)
+        self.assertNotEqual(early.health, "tracking", "so soon the events have confirmed nothing")
+        self.assertLess(early.t_ns, found.t_ns)
+        for wrong, says in ((("1,2,3", (0.1, 1)), "start pose"), ((words, (0.1, 1), "nowhere.h5"), "nowhere")):
+            with self.assertRaisesRegex(ValueError, says):
+                evpose.relocalise(self.folder, *wrong)
+
+    def test_smoothing_is_not_worse_than_tracking(self):
+        errors = {}
+        for name in ("track", "smooth"):
+            run = getattr(evpose, name)(self.folder, self.folder / f"run_{name}", settings={"rate_hz": 100})
+            off = np.linalg.norm(run.T_map_body[:, :3, 3] - position(run.t_ns * 1e-9), axis=1)
+            errors[name] = np.mean(off[run.valid])
+        self.assertLess(errors["smooth"], errors["track"] + 1e-4)
+
     def test_the_notebook_runs(self):
         try:
             import matplotlib  # noqa: F401
@@ -158,8 +180,8 @@ class ModuleTest(unittest.TestCase):
                               env={"PYTHONPATH": str(MODULE), "MPLBACKEND": "Agg", "HOME": str(self.folder),
                                    "EVPOSE_RECORDING": str(self.folder), "EVPOSE_OUTPUT": str(out)}, timeout=100)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "from 30 mm beside: ",
-                      "the last is tracking"):
+        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "from 30 mm beside: tracking",
+                      "smoothed: ", "the last is tracking"):
             self.assertIn(words, done.stdout)
         for name in ("recording", "track", "biases"):
             self.assertGreater((out / f"{name}.png").stat().st_size, 5000)

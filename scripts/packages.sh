@@ -3,7 +3,8 @@
 # The one list of packages that evpose needs, by their Debian and Ubuntu names, and their installation.
 #   scripts/packages.sh build    to build and run the program
 #   scripts/packages.sh test     the same, and all tests
-#   scripts/packages.sh package  to make and try packages and wheel
+#   scripts/packages.sh package  to make packages and wheel
+#   scripts/packages.sh try      to try them (scripts/test_packages.py), as root on Debian
 #   scripts/packages.sh arm64    to build and test for 64-bit ARM
 # Does nothing when everything is there. Reasons and versions: docs/dependencies.md.
 set -euo pipefail
@@ -46,6 +47,7 @@ test=(
   python3-tf2-msgs     # drive it
   ffmpeg               # encodes films of a run
   parallel             # builds the tiles of a map, as the example does
+  g++-aarch64-linux-gnu qemu-user-static  # kernels for vectors on 64-bit ARM
   clang-14 libclang-rt-14-dev  # fuzzing
   chromium             # draws the report
   clang-format-14      # pinned: each version formats differently
@@ -54,8 +56,11 @@ test=(
 package=(
   dpkg-dev file        # what a Debian package depends on
   python3-dev pybind11-dev python3-pip python3-setuptools python3-wheel  # the Python module and its wheel
-  python3-venv python3-h5py  # try it
-  mmdebstrap qemu-user-static  # a bare Debian, and an old processor, to try them on
+)
+try=(
+  mmdebstrap gpg       # bare systems to make them and try them in
+  buildah              # makes the image of docker/Dockerfile, without a daemon
+  qemu-user-static     # an old processor
 )
 arm64=(
   cmake ninja-build ccache
@@ -68,8 +73,9 @@ case "${1:-}" in
   build) wanted=("${build[@]}") ;;
   test) wanted=("${build[@]}" "${test[@]}") ;;
   package) wanted=("${build[@]}" "${package[@]}") ;;
+  try) wanted=("${try[@]}") ;;
   arm64) wanted=("${arm64[@]}") ;;
-  *) echo "usage: scripts/packages.sh build|test|package|arm64" >&2; exit 2 ;;
+  *) echo "usage: scripts/packages.sh build|test|package|try|arm64" >&2; exit 2 ;;
 esac
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then

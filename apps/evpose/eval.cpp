@@ -9,9 +9,12 @@
 
 #include "commands.h"
 #include "evpose/eval/score.h"
+#include "evpose/io/bags/bag_reader.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/motion/trajectory.h"
+#include "evpose/io/recording/recording.h"
 #include "evpose/report/page.h"
+#include "evpose/report/run_files.h"
 #include "evpose/report/summary.h"
 
 namespace evpose {
@@ -55,12 +58,28 @@ std::string times_in_words(const std::vector<TimedPose>& trajectory) {
   return out;
 }
 
+/// The trajectory of a file, or of the run folder that `evpose track -o` left.
+Expected<std::vector<TimedPose>> read_estimate(const std::string& path) {
+  return read_trajectory(is_run_folder(path) ? path + "/trajectory.tum" : path);
+}
+
+/// The ground truth of a file, or of a recording: then in the map and on the IMU's clock, as runs are.
+Expected<std::vector<TimedPose>> read_truth(const std::string& path) {
+  if (!std::filesystem::is_directory(path) || is_rosbag2_folder(path)) return read_trajectory(path);
+  const auto recording = open_recording(path);
+  if (!recording) return recording.error();
+  if (recording->groundtruth_path.empty())
+    return Error{path, "the recording has no ground truth",
+                 "give a recording that has, or a trajectory's file"};
+  return read_groundtruth(*recording);
+}
+
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 int eval(const EvalRequest& request) {
-  const auto estimate = read_trajectory(request.estimate);
+  const auto estimate = read_estimate(request.estimate);
   if (!estimate) return bad_input(estimate.error());
-  const auto truth = read_trajectory(request.truth);
+  const auto truth = read_truth(request.truth);
   if (!truth) return bad_input(truth.error());
   if (truth->size() < 2) return bad_input({request.truth, "one pose is no trajectory", "give two or more"});
   const TrajectoryScore score = score_trajectory({*estimate, *truth, {}, {}, {}}, options_of(request));
@@ -89,8 +108,13 @@ void add_eval(CLI::App& app, std::function<int()>& run) {
   auto* command = app.add_subcommand("eval", "Judge a trajectory against ground truth");
   const auto request = std::make_shared<EvalRequest>();
   EvalRequest& r = *request;
-  command->add_option("estimate", r.estimate, "trajectory: TUM, EuRoC or KITTI file, or a bag")->required();
-  command->add_option("groundtruth", r.truth, "one of the same frame and body")->required();
+  command
+      ->add_option("estimate", r.estimate, "run folder, or a trajectory: TUM, EuRoC or KITTI file, or a bag")
+      ->required();
+  command
+      ->add_option("groundtruth", r.truth,
+                   "recording with ground truth, or a trajectory of the same frame and body")
+      ->required();
   command->add_option("--align", r.alignment, "what is fitted before errors are taken")
       ->check(CLI::IsMember(names(kAlignments)))
       ->capture_default_str();

@@ -114,6 +114,10 @@ void describe_opened(Sheet& sheet, const FoundRecording& found, const Recording&
       sheet.find(poses.error());
     if (poses)
       for (const Error& doubt : doubt_axes_against(*poses, samples, r.imu_path)) sheet.find(doubt);
+  } else if (r.has_imu) {
+    for (const auto& doubt : {doubt_gyro_by_gravity(samples, r.imu_path),
+                              doubt_camera_roll(samples, r.T_cam_body.q.toRotationMatrix(), r.imu_path)})
+      if (doubt) sheet.find(*doubt);
   }
   if (found.camera) {
     describe_camera(sheet, *found.camera, "camera " + found.camera->name);

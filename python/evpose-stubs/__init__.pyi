@@ -207,3 +207,28 @@ def track(
     replace: bool = False,
 ) -> Run:
     """What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched first"""
+
+def smooth(
+    recording: str | PathLike[str],
+    output: str | PathLike[str],
+    map: str | PathLike[str] = '',
+    calibration: str | PathLike[str] = '',
+    occluders: str | PathLike[str] = '',
+    init: str = 'auto',
+    init_sigma: tuple[float, float] = ...,
+    settings: dict[str, Any] = {},
+    replace: bool = False,
+) -> Run:
+    """What evpose smooth does: the trajectory from all data, past and future"""
+
+def relocalise(
+    recording: str | PathLike[str],
+    init: str,
+    init_sigma: tuple[float, float],
+    map: str | PathLike[str] = '',
+    calibration: str | PathLike[str] = '',
+    occluders: str | PathLike[str] = '',
+    within_s: float = 1.0,
+    settings: dict[str, Any] = {},
+) -> Update:
+    """The pose near a rough one (x,y,z,qx,qy,qz,qw[@t_s]; init_sigma: m and deg per axis) that the events confirm: the first update whose health is tracking; without one, the last after within_s seconds of data"""

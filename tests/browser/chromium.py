@@ -138,8 +138,9 @@ class Page:
                 out.append(str([a.get("value", a.get("description")) for a in e["params"]["args"]]))
         return out
 
-    def screenshot(self, path):
-        shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True)
+    def screenshot(self, path, whole=True):
+        """Of all of the page, or of what its window shows."""
+        shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
         path.write_bytes(base64.b64decode(shot["data"]))
 
     def close(self):

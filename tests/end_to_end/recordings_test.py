@@ -138,6 +138,9 @@ class RecordingsTest(unittest.TestCase):
             ours = ours.get("accuracy", ours)
             for word in ("ate_mean_mm", "ate_rmse_mm", "ate_max_mm", "are_mean_deg", "lag_ms"):
                 self.assertAlmostEqual(ours[word], judge[word], delta=1e-3 + 1e-3 * abs(judge[word]), msg=f"{align} {word}")
+        by_name = [subprocess.run([EVPOSE, "eval", *words, "--json"], check=True, capture_output=True, text=True).stdout
+                   for words in (pair, [self.out / "run", SHARED / "data/peer/room_people"])]
+        self.assertEqual(*by_name, "a run and a recording are found in their folders")
 
     def test_real_hexacopter_from_events_alone(self):
         chunk = SHARED / "data/real/mvsec_indoor_flying1_chunk"

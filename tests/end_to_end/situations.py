@@ -195,6 +195,17 @@ def cut_map(place):
     spoilt(place)
 
 
+def planned(place):
+    """The cloud in tiles; made beforehand by `evpose map build --plan`."""
+    shutil.copytree(place / "planned", place / "tiles")
+
+
+def cut_tile(place):
+    planned(place)
+    path = place / "tiles/tile_0.ply"
+    path.write_bytes(path.read_bytes()[:-100])
+
+
 def start(change):
     """The rows of start.tum (t, place, quaternion x y z w) changed."""
     def prepare(place):
@@ -364,9 +375,27 @@ SECTIONS = {
         Situation("Not a number in a trajectory", "eval estimate.tum start.tum", 2, ["estimate.tum:6", "number|finite"], trajectory_with_nan),
         Situation("Trajectories of other times", "eval spoilt.tum start.tum", 2, ["no partner|fewer than two", "clock"],
                   start(lambda rows: rows + np.array([5000, 0, 0, 0, 0, 0, 0, 0]))),
+        Situation("Recording without ground truth to judge by", "eval start.tum flight", 2, ["flight", "no ground truth"]),
         Situation("Not a scenario", "simulate indor_spiral -o sim", 2, ["indor_spiral", "no such scenario"]),
         Situation("A map built from no cloud", "map build notes.ply -o new.h5", 2, ["notes.ply", "PLY|ply"],
                   write("notes.ply", "shopping list\n")),
         Situation("No run to look at", "view nowhere", 2, ["nowhere", "no such|no run|states.csv"]),
+    ],
+    "Maps in tiles, maps of boards, learning": [
+        Situation("Plan over a folder that is there", "map build cloud.ply --plan flight", 2, ["flight", "already", "another name"]),
+        Situation("Places of scanners and tiles", "map build cloud.ply --plan new --viewpoint 0,0,0", 2, ["--viewpoint", "whole"]),
+        Situation("No folder of tiles", "map merge flight -o new.h5", 2, ["flight", "plan.yaml", "--plan"]),
+        Situation("A tile that is not planned", "map build tiles --tile 99", 2, ["tiles", "99", "0 to"], planned),
+        Situation("Other settings for one tile", "map build tiles --tile 0 --set noise=0.01", 2, ["--set", "those of the plan"], planned),
+        Situation("Cloud of a tile cut off", "map build tiles --tile 0", 2, ["tile_0.ply", "truncated"], cut_tile),
+        Situation("Merged before all tiles are built", "map merge tiles -o new.h5", 2, ["tile 0 of", "--tile 0"], planned),
+        Situation("No board", "map board -o new.h5", 2, ["no board", "--checkerboard"]),
+        Situation("Two boards", "map board --checkerboard 9x7 --aprilgrid 6x6 --square 0.08 -o new.h5", 2, ["two boards", "one"]),
+        Situation("Board of one number", "map board --checkerboard 9 --square 0.08 -o new.h5", 2, ["'9'", "COLUMNSxROWS"]),
+        Situation("Board without a size", "map board --checkerboard 9x7 -o new.h5", 2, ["--square", "metres"]),
+        Situation("Board in millimetres", "map board --checkerboard 9x7 --square 80 -o new.h5", 2, ["--square", "millimetres", "metres"]),
+        Situation("Discs that touch", "map board --circles 4x11 --distance 0.02 --diameter 0.05 -o new.h5", 2, ["touch", "diameter"]),
+        Situation("Learning from a map without planes", "map learn map.h5 flight -o new.h5", 2, ["map.h5", "no planes", "evpose map build"]),
+        Situation("Learning over the map itself", "map learn map.h5 flight -o map.h5", 2, ["map.h5", "learnt from", "another"]),
     ],
 }

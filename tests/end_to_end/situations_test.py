@@ -72,6 +72,7 @@ def make_flight(place):
     made(place, "map", "import", "contours.ply", "--occluders", "made/mesh.ply", "-o", "map.h5")
     for name in ("events.raw", "events.bag"):
         made(place, "convert", "flight/events.h5", name, "--offset", "0.001")  # bags hold no times before zero
+    made(place, "map", "build", "cloud.ply", "--plan", "planned", "--set", "tile_points=10000")
     shutil.rmtree(place / "made")
 
 

@@ -20,6 +20,8 @@ except ImportError as missing:
     print(f"skipped: {missing}: scripts/packages.sh test")
     sys.exit(77)
 
+from corridor import corridor
+
 EVPOSE = ROOT = None
 SETTINGS = ["--set", "tile_points=40000"]
 
@@ -43,6 +45,50 @@ def street(length_m=24, per_m2=1200):
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n"
     header += "".join(f"property float {axis}\n" for axis in "xyz")
     return (header + "property uchar intensity\nend_header\n").encode() + rows.tobytes()
+
+
+FLIGHT = """
+scene_file: scene.yaml
+duration_s: 0.6
+camera: {size: custom, width: 240, height: 180, focal_px: 170}
+trajectory: {kind: traverse, centre_x_m: 12, centre_y_m: 0, centre_z_m: 1.4, size_forward_m: 8, size_left_m: 0.6, size_up_m: 0.4,
+  speed_m_s: 6}
+lidar: {on: true, flight: {kind: traverse, duration_s: 1, centre_x_m: 9, centre_y_m: 0, centre_z_m: 1.4, size_forward_m: 14,
+  size_left_m: 0.6, size_up_m: 0.4, speed_m_s: 14}}
+"""
+
+
+class FlightTest(unittest.TestCase):
+    """A flight across the borders of tiles gives the poses of the map that is read as a whole."""
+
+    def run_program(self, *words, statuses=(0,)):
+        done = subprocess.run([EVPOSE, "-q", *map(str, words)], capture_output=True, text=True, timeout=120)
+        self.assertIn(done.returncode, statuses, done.stdout + done.stderr)
+
+    def test_poses_do_not_tell_whether_the_map_is_read_by_place(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            root = pathlib.Path(scratch)
+            (root / "scene.yaml").write_text(corridor(20))
+            (root / "flight.yaml").write_text(FLIGHT)
+            self.run_program("simulate", root / "flight.yaml", "-o", root / "flight")
+            self.run_program("map", "build", root / "flight/map_raw.ply", "--plan", root / "tiles", "--set", "tile_points=10000")
+            plan = (root / "tiles/plan.yaml").read_text()
+            anchor = np.array(json.loads(re.search(r"anchor: (\[.*?\])", plan)[1]))[:2]
+            cores = np.array([json.loads(row)[:4] for row in re.findall(r"^  - (\[.*\])", plan, re.MULTILINE)])
+            for tile in range(len(cores)):
+                self.run_program("map", "build", root / "tiles", "--tile", tile)
+            self.run_program("map", "merge", root / "tiles", "-o", root / "map.h5")
+
+            places = np.loadtxt(root / "flight/groundtruth.tum")[:, None, 1:3] - anchor
+            tile_at = ((places >= cores[:, :2]) & (places < cores[:, 2:])).all(2).argmax(1)
+            self.assertGreater(len(set(tile_at)), 1, "no border is passed")
+            poses = []
+            for words in ([], ["--learn-map", root / "learnt.h5"]):  # the second wants all of the map
+                self.run_program("track", root / "flight", "--map", root / "map.h5", "-o", root / "run", "--force", *words,
+                                 statuses=(0, 1))
+                poses.append((root / "run/trajectory.tum").read_bytes())
+            self.assertGreater(poses[0].count(b"\n"), 100)
+            self.assertEqual(*poses)
 
 
 class TilesTest(unittest.TestCase):

@@ -139,7 +139,7 @@ function band(name, bound, both, ink) {
   const y = both ? bound.y.concat(bound.y.map((v) => -v).reverse()) : bound.y;
   return {
     type: "scatter", mode: "lines", name, x, y, fill: both ? "toself" : "tozeroy", fillcolor: faint(ink, both ? 0.09 : 0.16),
-    line: { width: 0, color: faint(ink, 0.4) }, hoverinfo: "skip",
+    line: { width: 1, color: faint(ink, 0.35) }, hoverinfo: "skip",
   };
 }
 
@@ -153,11 +153,13 @@ function aroundPaths(axis) {
   return [low - margin, high + margin];
 }
 
-/** A range that shows the errors in full, and their bounds unless these would make the errors small. */
+const median = (series) => series.y.map(Math.abs).sort((a, b) => a - b)[series.y.length >> 1] || 0;
+
+/** A range that shows the errors in full, and the edge of their bounds unless that would make the errors small. */
 function rangeOf(errors, bounds, both) {
   const error = Math.max(...errors.map(largest));
-  const bound = Math.max(0, ...bounds.filter(Boolean).map(largest));
-  const top = 1.1 * Math.max(error, Math.min(bound, 2 * error)) || 1;
+  const bound = Math.max(0, ...bounds.filter(Boolean).map(median));
+  const top = 1.1 * Math.max(error, Math.min(bound, 6 * error)) || 1;
   return both ? [-top, top] : [0, top];
 }
 
@@ -178,7 +180,8 @@ function trajectory3d() {
     });
   }
   const a = (title) => ({ title: { text: title }, gridcolor: colour("line"), zerolinecolor: colour("line"), color: colour("soft"), showbackground: false });
-  const scene = { aspectmode: "data", xaxis: a("x [m]"), yaxis: a("y [m]"), zaxis: a("z [m]"), camera: { eye: { x: 1.35, y: -1.55, z: 0.95 }, center: { x: 0, y: 0, z: -0.15 } } };
+  const far = window.innerWidth < 600 ? 1.3 : 1; // else the sides are cut off on a phone
+  const scene = { aspectmode: "data", xaxis: a("x [m]"), yaxis: a("y [m]"), zaxis: a("z [m]"), camera: { eye: { x: 1.35 * far, y: -1.55 * far, z: 0.95 * far }, center: { x: 0, y: 0, z: -0.15 } } };
   return { data, layout: layout({ scene, margin: { l: 0, r: 0, t: 24, b: 0 }, hovermode: "closest" }) };
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "evpose/batch/following_back_end.h"
+#include "evpose/tracker/map_pager.h"
 
 namespace evpose {
 namespace {
@@ -94,6 +95,14 @@ Status BatchEstimator::filter(const TrackRequest& request, const Progress& progr
   parameters_->add(widened((*tracker)->calibration()));
   summary_ = summarise(job_, request, **tracker, (*tracker)->calibration());
   return check_view(job_, updates_);
+}
+
+std::vector<Eigen::Vector3d> BatchEstimator::displacements() const {
+  std::vector<Eigen::Vector3d> out;
+  if (!parameters_->estimates_segments()) return out;
+  for (const std::uint32_t segment : named_segments(*job_.map, parameters_->segment_length_m()))
+    out.push_back(parameters_->displacement_of(segment));
+  return out;
 }
 
 TrackJob BatchEstimator::at_present_values() const {

@@ -49,6 +49,8 @@ class BatchEstimator {
   /// Of the last pass: what was measured, at the trajectory before it.
   const std::vector<Update>& updates() const { return updates_; }
   const RunSummary& summary() const { return summary_; }
+  /// Of each point of the map, by how much its segment stands off, map frame, m; empty: not estimated.
+  std::vector<Eigen::Vector3d> displacements() const;
   /// The job with the calibration as it is known now.
   TrackJob at_present_values() const;
   /// What the present or last pass measures with.

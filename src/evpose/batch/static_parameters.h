@@ -45,6 +45,8 @@ class StaticParameters {
     if (shared_ == Shared::left_out) return SharedErrors::kCount;
     return places_.time ? 1 : 0;
   }
+  /// Only if it estimates them.
+  double segment_length_m() const { return segments_config_->length_m; }
   /// No contour says anything of the rest.
   bool takes_contours() const {
     return places_.intrinsics || estimates_segments() || shared_ == Shared::considered;

@@ -11,6 +11,7 @@ namespace {
 constexpr int kPointsOfSide = 12;        // of a square, none of them at a corner
 constexpr double kLongestStep_m = 0.01;  // between them
 constexpr int kLeastCount = 2, kMostCount = 1000;
+constexpr double kLongest_m = 10;  ///< side of a square: more is given in another unit
 
 /// In the plane of the board: x to the right, z up.
 using Place = Eigen::Vector2d;
@@ -80,18 +81,27 @@ class Sheet {
   std::int32_t contour_ = 0;
 };
 
-Status check(int columns, int rows, std::initializer_list<double> lengths) {
+struct NamedLength {
+  const char* name;
+  double m;
+};
+
+Status check(int columns, int rows, std::initializer_list<NamedLength> lengths) {
   if (std::min(columns, rows) < kLeastCount || std::max(columns, rows) > kMostCount)
     return Error{"board", text(columns, "x", rows, " is no board"),
                  text("give from ", kLeastCount, " to ", kMostCount, " columns and rows")};
-  for (const double length : lengths)
-    if (!(length > 0) || !std::isfinite(length))
-      return Error{"board", text(length, " m is no length"), "give metres"};
+  for (const auto& [name, length_m] : lengths) {
+    if (!(length_m > 0) || !std::isfinite(length_m))
+      return Error{"board", text(name, ": ", length_m, " m is no length"), text("give ", name, " in metres")};
+    if (length_m > kLongest_m)
+      return Error{"board", text(name, ": ", length_m, " m is longer than that of any board"),
+                   text("give ", name, " in metres, not millimetres")};
+  }
   return {};
 }
 
 Expected<ContourMap> map_of(const Checkerboard& b) {
-  if (auto ok = check(b.columns, b.rows, {b.square_m}); !ok) return ok.error();
+  if (auto ok = check(b.columns, b.rows, {{"--square", b.square_m}}); !ok) return ok.error();
   Sheet sheet;
   const Place corner = -0.5 * b.square_m * Place(b.columns, b.rows);
   for (int row = 0; row < b.rows; ++row)
@@ -101,7 +111,8 @@ Expected<ContourMap> map_of(const Checkerboard& b) {
 }
 
 Expected<ContourMap> map_of(const AprilGrid& b) {
-  if (auto ok = check(b.columns, b.rows, {b.tag_m, b.spacing}); !ok) return ok.error();
+  if (auto ok = check(b.columns, b.rows, {{"--tag", b.tag_m}, {"--spacing", b.spacing}}); !ok)
+    return ok.error();
   Sheet sheet;
   const double gap = b.spacing * b.tag_m, step = b.tag_m + gap;
   const Place corner = -0.5 * (step * Place(b.columns, b.rows) - Place(gap, gap));
@@ -115,7 +126,8 @@ Expected<ContourMap> map_of(const AprilGrid& b) {
 }
 
 Expected<ContourMap> map_of(const CircleGrid& b) {
-  if (auto ok = check(b.columns, b.rows, {b.distance_m, b.diameter_m}); !ok) return ok.error();
+  if (auto ok = check(b.columns, b.rows, {{"--distance", b.distance_m}, {"--diameter", b.diameter_m}}); !ok)
+    return ok.error();
   const double nearest = b.shifted ? std::numbers::sqrt2 * b.distance_m : b.distance_m;
   if (!(b.diameter_m < nearest))
     return Error{"board", text("discs of ", b.diameter_m, " m at ", nearest, " m touch each other"),

@@ -26,20 +26,18 @@ constexpr int kRounds = 12;
 constexpr std::size_t kBegins = 16;  // cells around which the fit begins
 constexpr double kBeginShare = 0.2;  // of the plane's extent: how far around
 
-struct Cell {
-  double count = 0;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  ///< along the plane's two axes, and over it
-  std::vector<std::uint32_t> points;
-  Eigen::Vector3d mean() const { return sum / count; }
-};
-
 using Place = std::pair<int, int>;
+
+struct Cell {
+  Place place;
+  double count = 0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< along the plane's two axes, and over it
+};
 
 /// Height over the plane as a + b x + c y.
 using Form = Eigen::Vector3d;
 double off(const Form& form, const Cell& cell) {
-  const Eigen::Vector3d at = cell.mean();
-  return at.z() - form[0] - form[1] * at.x() - form[2] * at.y();
+  return cell.mean.z() - form[0] - form[1] * cell.mean.x() - form[2] * cell.mean.y();
 }
 
 class LayeredPlane {
@@ -59,7 +57,8 @@ class LayeredPlane {
   double sigma_m(const Cell& cell) const { return noise_m_ / std::sqrt(cell.count); }
 
   double noise_m_;
-  std::map<Place, Cell> cells_;
+  std::map<Place, std::vector<std::uint32_t>> points_;  ///< of each place
+  std::vector<Cell> cells_;  ///< in the order of their places; those with enough points
 };
 
 LayeredPlane::LayeredPlane(const SurfacePoints& surface, const std::vector<std::uint32_t>& points)
@@ -76,50 +75,64 @@ LayeredPlane::LayeredPlane(const SurfacePoints& surface, const std::vector<std::
   const double edge_m = std::sqrt(kCellPoints) * static_cast<double>(median(spacing));
   for (const std::uint32_t i : points) {
     const Eigen::Vector3d x = surface.position[i].cast<double>() - centre;
-    const Eigen::Vector3d at(u.dot(x), v.dot(x), n.dot(x));
-    Cell& cell = cells_[{static_cast<int>(std::floor(at.x() / edge_m)),
-                         static_cast<int>(std::floor(at.y() / edge_m))}];
-    cell.count += 1;
-    cell.sum += at;
-    cell.points.push_back(i);
+    const Eigen::Vector2d at(u.dot(x), v.dot(x));
+    points_[{static_cast<int>(std::floor(at.x() / edge_m)), static_cast<int>(std::floor(at.y() / edge_m))}]
+        .push_back(i);
   }
-  std::erase_if(cells_, [](const auto& entry) { return entry.second.count < kFewestInCell; });
+  for (const auto& [place, own] : points_) {
+    const auto count = static_cast<double>(own.size());
+    if (count < kFewestInCell) continue;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const std::uint32_t i : own) {
+      const Eigen::Vector3d x = surface.position[i].cast<double>() - centre;
+      sum += Eigen::Vector3d(u.dot(x), v.dot(x), n.dot(x));
+    }
+    cells_.push_back({place, count, sum / count});
+  }
 }
 
 /// Weighted by `weight_of(cell)`.
 template <class WeightOf>
 std::optional<LayeredPlane::Fit> LayeredPlane::fitted(const WeightOf& weight_of) const {
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double sum = 0;
-  for (const auto& [place, cell] : cells_) {
+  // The lower triangle of the normal matrix, number by number: the loop that the time goes into.
+  double one = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, z = 0, xz = 0, yz = 0;
+  for (const Cell& cell : cells_) {
     const double weight = weight_of(cell);
-    const Eigen::Vector3d at = cell.mean(), row(1, at.x(), at.y());
-    squares += weight * row * row.transpose();
-    right += weight * at.z() * row;
-    sum += weight;
+    const Eigen::Vector3d& at = cell.mean;
+    const double wx = weight * at.x(), wy = weight * at.y(), wz = weight * at.z();
+    one += weight;
+    x += wx;
+    y += wy;
+    xx += wx * at.x();
+    xy += wy * at.x();
+    yy += wy * at.y();
+    z += wz;
+    xz += wz * at.x();
+    yz += wz * at.y();
   }
+  Eigen::Matrix3d squares;
+  squares << one, x, y, x, xx, xy, y, xy, yy;
   const Eigen::LDLT<Eigen::Matrix3d> solver(squares);
   if (solver.info() != Eigen::Success) return {};
-  const Form form = solver.solve(right);
+  const Form form = solver.solve(Eigen::Vector3d(z, xz, yz));
   if (!form.allFinite()) return {};
-  return Fit{form, sum};
+  return Fit{form, one};
 }
 
 /// A fit to all of a layered plane leans through both layers and stays there. So it begins around many
 /// places, and its weights fall off ever more narrowly; what gathers most weight is the larger surface.
 std::optional<Form> LayeredPlane::larger_surface() const {
   Eigen::AlignedBox2d box;
-  for (const auto& [place, cell] : cells_) box.extend(cell.mean().head<2>());
+  for (const Cell& cell : cells_) box.extend(cell.mean.head<2>());
   const double near_m = kBeginShare * box.diagonal().norm();
   std::optional<Fit> best;
   std::size_t number = 0;
   const std::size_t stride = std::max<std::size_t>(1, cells_.size() / kBegins);
-  for (const auto& [place, begin] : cells_) {
+  for (const Cell& begin : cells_) {
     if (number++ % stride != stride / 2) continue;
-    const Eigen::Vector2d middle = begin.mean().head<2>();
+    const Eigen::Vector2d middle = begin.mean.head<2>();
     std::optional<Fit> fit = fitted(
-        [&](const Cell& cell) { return (cell.mean().head<2>() - middle).norm() < near_m ? cell.count : 0; });
+        [&](const Cell& cell) { return (cell.mean.head<2>() - middle).norm() < near_m ? cell.count : 0; });
     for (int round = 0; fit && round < kRounds; ++round) {
       const double share = round / (kRounds - 1.0);
       const double width_m = noise_m_ * kFirstWidth * std::pow(kLastWidth / kFirstWidth, share);
@@ -141,9 +154,9 @@ std::vector<std::uint32_t> LayeredPlane::largest_part_beside(double least_points
   if (!form) return {};
   // Cells that stand off on one side and touch.
   std::map<Place, int> beside;
-  for (const auto& [place, cell] : cells_)
+  for (const Cell& cell : cells_)
     if (const double d = off(*form, cell); std::abs(d) > std::hypot(kStandsOff * sigma_m(cell), kUneven_m))
-      beside[place] = d > 0 ? 1 : -1;
+      beside[cell.place] = d > 0 ? 1 : -1;
   std::vector<std::uint32_t> largest;
   while (!beside.empty()) {
     const int side = beside.begin()->second;
@@ -160,8 +173,8 @@ std::vector<std::uint32_t> LayeredPlane::largest_part_beside(double least_points
     if (static_cast<double>(part.size()) < kFewestCells) continue;
     std::vector<std::uint32_t> points;
     for (const Place& place : part) {
-      const Cell& cell = cells_.at(place);
-      points.insert(points.end(), cell.points.begin(), cell.points.end());
+      const auto& own = points_.at(place);
+      points.insert(points.end(), own.begin(), own.end());
     }
     if (points.size() > largest.size()) largest = std::move(points);
   }

@@ -65,7 +65,7 @@ class Adjuster {
     for (std::size_t i = 1; i < p_.observations.size(); ++i)
       EVPOSE_CHECK(p_.observations[i - 1].landmark <= p_.observations[i].landmark);
     weights_.assign(p_.observations.size(), 1);
-    prior_weights_.assign(p_.landmarks.size(), 1);
+    prior_weights_.assign(p_.landmarks.size(), Eigen::Vector2d::Ones());
     moves_.assign(p_.landmarks.size(), Eigen::Vector3d::Zero());
   }
 
@@ -82,7 +82,8 @@ class Adjuster {
   const AdjustmentProblem& p_;
   Layout at_;
   std::vector<std::size_t> first_;  ///< observation of each landmark
-  std::vector<double> weights_, prior_weights_;
+  std::vector<double> weights_;
+  std::vector<Eigen::Vector2d> prior_weights_;
   Eigen::VectorXd x_;
   std::vector<Eigen::Vector3d> moves_;
   Eigen::LDLT<Eigen::MatrixXd> ldlt_;
@@ -101,7 +102,7 @@ Share Adjuster::share_of(std::size_t j) const {
   for (std::size_t i = first_[j]; i < first_[j + 1]; ++i) {
     const Observation& o = p_.observations[i];
     Row row = row_of(p_, at_, o);
-    const double w = weights_[i] / o.variance_px;
+    const double w = weights_[i] / o.variance_px2;
     for (auto& [column, value] : row.kept)
       column = std::lower_bound(s.columns.begin(), s.columns.end(), column) - s.columns.begin();
     for (const auto& [a, va] : row.kept) {
@@ -114,7 +115,7 @@ Share Adjuster::share_of(std::size_t j) const {
   }
   const Landmark& landmark = p_.landmarks[j];
   for (int d = 0; d < 2; ++d) {
-    const double w = (d == 0 ? prior_weights_[j] : 1) / (landmark.sigma_m(d) * landmark.sigma_m(d));
+    const double w = prior_weights_[j](d) / (landmark.sigma_m(d) * landmark.sigma_m(d));
     s.own(d, d) += w;
     s.own_b(d) -= w * landmark.moved_m(d);
   }
@@ -123,7 +124,9 @@ Share Adjuster::share_of(std::size_t j) const {
 }
 
 void Adjuster::add_priors(Eigen::MatrixXd& H, Eigen::VectorXd& b) const {
-  H.diagonal().head<15>() += p_.start_sigma.cwiseAbs2().cwiseInverse();
+  const Matrix15d start = p_.start_covariance.ldlt().solve(Matrix15d::Identity());
+  H.topLeftCorner<15, 15>() += start;
+  b.head<15>() -= start * p_.start_offset;
   for (std::size_t k = 0; k < p_.steps.size(); ++k) {
     const KnotStep& step = p_.steps[k];
     const Matrix15d information = step.noise.ldlt().solve(Matrix15d::Identity());
@@ -176,11 +179,12 @@ double Adjuster::residual(const Observation& o, const Eigen::Vector3d& own) cons
 void Adjuster::reweight() {
   for (std::size_t i = 0; i < p_.observations.size(); ++i) {
     const Observation& o = p_.observations[i];
-    weights_[i] = robust_weight(residual(o, moves_[o.landmark]) / std::sqrt(o.variance_px));
+    weights_[i] = robust_weight(residual(o, moves_[o.landmark]) / std::sqrt(o.scatter_px2));
   }
   for (std::size_t j = 0; j < p_.landmarks.size(); ++j) {
     const Landmark& l = p_.landmarks[j];
-    prior_weights_[j] = l.doubtful ? robust_weight((l.moved_m(0) + moves_[j](0)) / l.sigma_m(0)) : 1;
+    for (int d = 0; d < 2; ++d)
+      prior_weights_[j](d) = robust_weight((l.moved_m(d) + moves_[j](d)) / l.sigma_m(d));
   }
 }
 
@@ -192,7 +196,7 @@ LandmarkEstimate Adjuster::estimate(std::size_t j, const Eigen::MatrixXd& covari
   out.observations = static_cast<int>(first_[j + 1] - first_[j]);
   for (std::size_t i = first_[j]; i < first_[j + 1]; ++i) {
     const double r = residual(p_.observations[i], moves_[j]);
-    out.chi2 += std::min(kChi2Cut, r * r / p_.observations[i].variance_px) / out.observations;
+    out.chi2 += std::min(kChi2Cut, r * r / p_.observations[i].scatter_px2) / out.observations;
   }
   const Eigen::Matrix3d inverse = s.own.ldlt().solve(Eigen::Matrix3d::Identity());
   const auto n = static_cast<Index>(s.columns.size());

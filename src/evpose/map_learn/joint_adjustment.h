@@ -14,8 +14,8 @@ namespace evpose::map_learn {
 struct Landmark {
   Eigen::Matrix<double, 3, 2> directions = Eigen::Matrix<double, 3, 2>::Zero();  ///< unit, map frame
   Eigen::Vector2d moved_m = Eigen::Vector2d::Zero();  ///< from where it was given to where it was seen
-  Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();  ///< of where it was given
-  bool doubtful = true;  ///< it may stand on another edge altogether: the first sigma is that of the many
+  /// Of where it was given: that of the many, since it may stand on another edge or surface altogether.
+  Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();
 };
 
 /// What the events of one landmark said over a short time, at the present trajectory and place of it:
@@ -27,8 +27,9 @@ struct Observation {
   Vector6d by_pose = Vector6d::Zero();
   Eigen::Vector3d by_point = Eigen::Vector3d::Zero();  ///< px/m, map frame
   double offset_px = 0;
-  double forward = 0;      ///< +1, -1: sense of the contour's motion; less where it is slow
-  double variance_px = 1;  ///< px^2
+  double forward = 0;       ///< +1, -1: sense of the contour's motion; less where it is slow
+  double variance_px2 = 1;  ///< as one of many: what lasts longer than one of them is counted in it
+  double scatter_px2 = 1;   ///< its own variance, by which it is judged
 };
 
 /// From one knot to the next: d_next = transition d - offset + noise.
@@ -42,7 +43,9 @@ struct KnotStep {
 /// knots.
 struct AdjustmentProblem {
   std::vector<KnotStep> steps;  ///< one less than there are knots
-  Vector15d start_sigma = Vector15d::Ones();
+  /// Of the first state, beside the recording: its error d has d + start_offset ~ N(0, start_covariance).
+  Matrix15d start_covariance = Matrix15d::Identity();
+  Vector15d start_offset = Vector15d::Zero();
   std::vector<Landmark> landmarks;
   std::vector<Observation> observations;  ///< those of a landmark together, in the order of their landmarks
   double delay_sigma_px = 0.05, own_delay_sigma_px = 0.08;
@@ -69,7 +72,7 @@ struct AdjustmentResult {
   std::vector<Matrix6d> pose_covariances;  ///< at the knots
 };
 
-/// Weighted least squares; observations and the places of doubtful landmarks count less the further they lie
+/// Weighted least squares; observations and the places of landmarks count less the further they lie
 /// off (solved again with new weights, `reweightings` times). Deterministic. `R_map_body`: at the knots.
 AdjustmentResult adjust(const AdjustmentProblem& problem, const std::vector<Eigen::Matrix3d>& R_map_body,
                         int reweightings = 6);

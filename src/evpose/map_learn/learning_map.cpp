@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/fusion/fusion_config.h"
+
 namespace evpose::map_learn {
 namespace {
 
 // Of what a cloud's map says of a contour, beside the sigma that it states.
-constexpr double kContour_m = 2e-3;  // across it: some stand on another edge, and count less then
-constexpr double kSurface_m = 1e-3;  // of a rim along the normal of its face
-// Of a marking: nothing is known along its plane. Across it the parallax tells more than a built plane, whose
-// faces stand some millimetres off here and there and would bend the trajectory.
-constexpr double kAlongPlane_m = 0.1, kOffPlane_m = 0.03;
+constexpr double kContour_m = SegmentOffsetConfig{}.sigma_m;  // some stand on another edge, and count less
+// Of a marking: nothing is known along its plane; across it some faces stand further off.
+constexpr double kAlongPlane_m = 0.1, kOffPlane_m = 1e-3;
 // What is not in the adjustment's covariance: light and shade beside an edge, a tangent that leans.
 constexpr double kFloor_m = 0.3e-3;
 
@@ -40,6 +40,11 @@ std::int32_t LearningMap::next_contour() const {
   std::int32_t next = 0;
   for (const ContourPoint& p : map_.points) next = std::max(next, p.contour + 1);
   return next;
+}
+
+void LearningMap::displace(const std::vector<Eigen::Vector3d>& displacements) {
+  for (std::size_t i = 0; i < displacements.size(); ++i)
+    map_.points[i].position += displacements[i].cast<float>();
 }
 
 void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
@@ -77,11 +82,9 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
     if (example[s]->kind == ContourKind::marking) {
       l.sigma_m = record[s]->is_new ? Eigen::Vector2d(kAlongPlane_m, kOffPlane_m)
                                     : Eigen::Vector2d(stated, stated / kViewChange);
-      l.doubtful = !record[s]->is_new;
     } else {
       const double across = std::hypot(stated, kContour_m);
-      l.sigma_m = {across,
-                   example[s]->kind == ContourKind::boundary ? std::hypot(stated, kSurface_m) : across};
+      l.sigma_m = {across, across};
     }
     l.moved_m = l.directions.transpose() * (moved[s] / points[s]);
   }
@@ -129,6 +132,8 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     if (verdict == Verdict::good) {
       take(e, unknowns[s], i);
       p.contrast = observed.map.points[i].contrast;
+    } else if (verdict == Verdict::untold && !record.was_told) {
+      p.position = record.given;
     }
     gone[i] = verdict == Verdict::wrong || (record.is_new && verdict == Verdict::untold);
     if (gone[i] && !record.is_new) struck_m_ += static_cast<double>(p.length);

@@ -26,6 +26,8 @@ class LearningMap {
 
   /// As it is now.
   const ContourMap& map() const { return map_; }
+  /// Moves the given contours to where they are already known to stand off: of each point, map frame, m.
+  void displace(const std::vector<Eigen::Vector3d>& displacements);
   /// Markings whose place is as well known as the trajectory that they were seen from.
   void add_markings(const std::vector<ContourPoint>& points);
 

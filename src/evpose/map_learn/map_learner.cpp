@@ -23,14 +23,6 @@ constexpr double kDegree = 57.29577951;
 constexpr double kLeastSpread_deg = 1;
 constexpr double kWorstCommon_m = 0.01;
 
-/// What is known of the first state beside the recording: little, so that the cloud alone gives the frame.
-Vector15d start_sigma() {
-  Vector15d sigma;
-  sigma << Eigen::Vector3d::Constant(0.03), Eigen::Vector3d::Constant(0.02), Eigen::Vector3d::Constant(0.5),
-      Eigen::Vector3d::Constant(0.02), Eigen::Vector3d::Constant(0.1);
-  return sigma;
-}
-
 /// One flight and a map on their way to each other.
 class FlightLearner {
  public:
@@ -57,6 +49,7 @@ class FlightLearner {
   LearningMap learning_;
   const LearnProgress& progress_;
   std::optional<TrackJob> job_;
+  std::optional<FusionState> start_;  ///< what is known of it beside the recording
   Trajectory trajectory_;
   FlightReport report_;
   int steps_done_ = 0;
@@ -96,6 +89,7 @@ Status FlightLearner::smooth() {
                  text("was tracked in ", std::lround(100 * report_.tracked),
                       " % of its time with this map; nothing can be learnt from it"),
                  "check that it was flown in the place of the map; evpose check says more"};
+  start_ = estimator.trajectory().front();
   for (int pass = 0; pass < kSmoothings; ++pass) {
     ++steps_done_;
     const auto changed = estimator.iterate(request_, progress);
@@ -104,6 +98,7 @@ Status FlightLearner::smooth() {
   }
   ++steps_done_;
   trajectory_ = estimator.trajectory();
+  learning_.displace(estimator.displacements());
   job_ = estimator.at_present_values();
   return {};
 }
@@ -126,7 +121,8 @@ Status FlightLearner::adjust_once() {
   const ContourSegments segments = cut_into_segments(learning_.map());
   AdjustmentProblem problem;
   problem.steps = seen->steps;
-  problem.start_sigma = start_sigma();
+  problem.start_covariance = start_->covariance;
+  problem.start_offset = trajectory_.front().minus(*start_);
   problem.landmarks = learning_.landmarks(segments);
   problem.observations = seen->observations;
   std::vector<Eigen::Matrix3d> rotations;

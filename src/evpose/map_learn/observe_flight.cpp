@@ -15,6 +15,7 @@ constexpr TimeNs kKnot = 100 * kNsPerMs;
 constexpr TimeNs kBin = 50 * kNsPerMs;  // events of a landmark that become one observation
 constexpr double kEvent_px = 0.4;       // scatter of a contour's events about it
 constexpr double kLasting_px = 0.15;    // of what the events of a bin share
+constexpr double kMemory_s = 0.15;      // for so long the next ones share it, too
 constexpr double kLeastWeight = 4;      // events, below which a bin says nothing
 constexpr double kSlow_px_s = 20;       // below this flow the edge's delay fades out (design 5.2)
 
@@ -143,7 +144,9 @@ void take_sums(const ObservingBackEnd::Log& log, const Trajectory& trajectory, F
     o.by_point = sum.by_point / sum.weight;
     o.offset_px = sum.offset / sum.weight;
     o.forward = sum.forward / sum.weight;
-    o.variance_px = kEvent_px * kEvent_px / sum.weight + kLasting_px * kLasting_px;
+    const double own = kEvent_px * kEvent_px / sum.weight, shared = kLasting_px * kLasting_px;
+    o.scatter_px2 = own + shared;
+    o.variance_px2 = own + shared * 2 * kMemory_s / to_seconds(kBin);
     out.observations.push_back(o);
     out.views.push_back(sum.view.normalized());
   }

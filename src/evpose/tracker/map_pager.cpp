@@ -8,9 +8,7 @@
 #include "evpose/registration/contrast_memory.h"
 
 namespace evpose {
-namespace {
 
-/// The lowest number of a point of each segment, in the map as a whole: parts agree about it.
 std::vector<std::uint32_t> named_segments(const ContourMap& map, double length_m) {
   const ContourSegments segments = cut_into_segments(map, length_m);
   std::vector<std::uint32_t> name(segments.count, ~0U), out(map.points.size());
@@ -21,8 +19,6 @@ std::vector<std::uint32_t> named_segments(const ContourMap& map, double length_m
   for (std::uint32_t i = 0; i < out.size(); ++i) out[i] = name[segments.of_point[i]];
   return out;
 }
-
-}  // namespace
 
 PreparedMap::PreparedMap(std::shared_ptr<const ContourMap> given, double offset_segment_m)
     : map(std::move(given)), index(*map), segments(cut_into_segments(*map)) {

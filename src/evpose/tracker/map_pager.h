@@ -19,6 +19,9 @@ namespace evpose {
 using MapParts =
     std::function<std::shared_ptr<const ContourMap>(const Eigen::Vector3d& place_map, double radius_m)>;
 
+/// The segment of each point, named by the lowest number of a point of it in the map as a whole: parts agree.
+std::vector<std::uint32_t> named_segments(const ContourMap& map, double length_m);
+
 /// A map, or a part of one, with what is made of it once.
 struct PreparedMap {
   std::shared_ptr<const ContourMap> map;

@@ -23,6 +23,8 @@ constexpr double kWhirl_m_s2 = 4;           // spread of these means that hardly
 constexpr double kExplainedShare = 0.55;    // of the spread, left by other axes: then they are the right ones
 constexpr double kFastInDegrees_rad_s = 3;  // root mean square of rates that may be degrees
 constexpr double kDegreesShare = 1.0 / 3;   // of the spread, left by the other unit
+constexpr double kSteepSine = 0.8;  // of the way that the camera looks up or down: no roll is told then
+constexpr double kLyingDeg = 50;    // roll that hardly a flight has in the mean
 // Against a reference.
 constexpr double kTurnWindow_s = 0.1;
 constexpr double kLeastTurn_rad = 0.004;  // root mean square turn over a window
@@ -196,6 +198,24 @@ std::optional<Error> doubt_gyro_by_gravity(const std::vector<ImuSample>& samples
   const Choice choice = choose([&](const AxisNames& names) { return force_spread(part, names); });
   if (choice.cost > kExplainedShare * as_read) return {};
   return wrong_axes(where, "gyroscope", "the accelerometer's gravity", choice.names);
+}
+
+std::optional<Error> doubt_camera_roll(const std::vector<ImuSample>& samples,
+                                       const Eigen::Matrix3d& R_cam_imu, const std::string& where) {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const ImuSample& s : samples) {
+    if (to_seconds(s.t - samples.front().t) > kLookedAt_s) break;
+    force += s.accel;
+  }
+  if (samples.size() < 10 || force.norm() == 0) return {};
+  const Eigen::Vector3d up = (R_cam_imu * force).normalized();
+  if (std::abs(up.z()) > kSteepSine) return {};
+  const double roll_deg = kDegreesPerRadian * std::atan2(up.x(), -up.y());
+  if (std::abs(roll_deg) < kLyingDeg) return {};
+  return Error{where,
+               text("by gravity the camera is rolled by ", std::round(std::abs(roll_deg)),
+                    " deg: if it is not, axes of the IMU are swapped or mirrored, or T_cam_imu is wrong"),
+               "rename the columns (imu.columns in recording.yaml), or calibrate camera and IMU together"};
 }
 
 std::optional<Error> doubt_imu_scales(const std::vector<ImuSample>& samples, const std::string& where) {

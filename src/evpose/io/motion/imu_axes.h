@@ -23,6 +23,12 @@ std::string in_words(const AxisNames& names);
 /// more than what was read: most short or gentle flights tell nothing. Unset: no doubt.
 std::optional<Error> doubt_gyro_by_gravity(const std::vector<ImuSample>& samples, const std::string& where);
 
+/// By gravity the camera, which does not look steeply up or down, lies on its side or on its head: what
+/// swapped and mirrored axes of both sensors make, or a rotation in T_cam_imu that is wrong. `R_cam_imu`:
+/// turns the IMU's axes into the camera's (x right, y down, z forward).
+std::optional<Error> doubt_camera_roll(const std::vector<ImuSample>& samples,
+                                       const Eigen::Matrix3d& R_cam_imu, const std::string& where);
+
 /// A mean specific force that is far from gravity's size though neither g nor free of gravity (ImuUnitCheck
 /// tells those), or stamps of which no IMU has so many or so few in a second: another unit.
 std::optional<Error> doubt_imu_scales(const std::vector<ImuSample>& samples, const std::string& where);

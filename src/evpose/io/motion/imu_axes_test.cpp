@@ -115,6 +115,20 @@ TEST(ImuAxes, DegreesAreFoundByGravityAlone) {
   EXPECT_TRUE(says(doubt->line(), {"deg/s", "imu.gyro_unit: deg/s"}));
 }
 
+/// A camera that looks level and ahead on a body with x forward and z up, which hardly turns.
+TEST(ImuAxes, GravityTellsWhenTheCameraLiesOnItsSideOrHead) {
+  Eigen::Matrix3d ahead;
+  ahead << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  const auto flight = turning_flight(0.05);
+  EXPECT_FALSE(doubt_camera_roll(flight.imu, ahead, "imu.csv"));
+  for (const AxisNames& names : every_axis_names()) {
+    std::vector<ImuSample> read = flight.imu;
+    for (ImuSample& s : read) s.accel = names * s.accel, s.gyro = names * s.gyro;
+    const Eigen::Vector3d up = names.col(2);  // as read
+    EXPECT_EQ(doubt_camera_roll(read, ahead, "imu.csv").has_value(), up.y() != 0 || up.z() < 0) << names;
+  }
+}
+
 TEST(ImuAxes, OtherUnitsOfForceAndTimeAreDoubted) {
   const auto doubt = [](double force, double time) {
     auto read = turning_flight().imu;

@@ -8,10 +8,11 @@ import yaml
 
 def parse(text):
     cam = yaml.safe_load(text)["cam0"]
-    out = {"intrinsics": cam["intrinsics"], "distortion": cam["distortion_coeffs"], "model": cam["distortion_model"],
-           "size": cam["resolution"]}
+    # Converted, since YAML 1.1 takes 5e-04 for a word.
+    out = {"intrinsics": [float(v) for v in cam["intrinsics"]], "distortion": [float(v) for v in cam["distortion_coeffs"]],
+           "model": cam["distortion_model"], "size": cam["resolution"]}
     if "T_cam_imu" in cam:
-        out |= {"T_cam_imu": np.array(cam["T_cam_imu"], dtype=float), "time_s": cam.get("timeshift_cam_imu", 0.0)}
+        out |= {"T_cam_imu": np.array(cam["T_cam_imu"], dtype=float), "time_s": float(cam.get("timeshift_cam_imu", 0.0))}
     if "calibration_correlation" in cam:
         sigma = cam["intrinsics_sigma"] + cam["distortion_sigma"]
         if "T_cam_imu_sigma" in cam:

@@ -98,7 +98,7 @@ void FollowingBackEnd::arrive() {
 /// What single contours say of parameters beside the pose.
 void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
   const Eigen::Matrix3d R = state_.nav.T_map_body.rotation();
-  std::array<BlockRow, 2> rows;
+  std::array<BlockRow, 4> rows;
   for (const ContourOffset& contour : contours) {
     std::size_t n = 0;
     const auto add = [&](int block, int place, const BlockRow::Derivative& derivative) {
@@ -116,9 +116,10 @@ void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
     if (const auto place = parameters_.places().intrinsics;
         place && contour.by_intrinsics.size() == parameters_.intrinsics_count())
       add(0, *place, contour.by_intrinsics);
-    const BlockSample sample{contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}};
-    if (n > 0) measurement_.add(sample);
-    SharedErrors::add(contour, sample, measurement_);
+    for (const auto& [number, px] : SharedErrors::on(contour))
+      if (const auto place = parameters_.shared_error(number))
+        add(1 + *place, *place, BlockRow::Derivative::Constant(1, px));
+    if (n > 0) measurement_.add({contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}});
   }
 }
 
@@ -164,8 +165,7 @@ Vector6d FollowingBackEnd::seen_pose_by_time() const {
   return seen_pose_by_time_offset(state);
 }
 
-/// The measurement, of the seen pose and of blocks, as one of the pose and of parameters. Of shared errors
-/// among themselves it says nothing, since they are not estimated.
+/// The measurement, of the seen pose and of blocks, as one of the pose and of parameters.
 ChainMeasurement FollowingBackEnd::by_parameters() const {
   const StaticParameters::Places& at = parameters_.places();
   std::vector<std::pair<int, Vector6d>> shifts;
@@ -178,9 +178,7 @@ ChainMeasurement FollowingBackEnd::by_parameters() const {
 
   ChainMeasurement out;
   const auto shifted = static_cast<Eigen::Index>(shifts.size());
-  const int first = parameters_.first_shared();
-  const Eigen::Index blocks = measurement_.size() - 6, shared = SharedErrors::kCount - first;
-  const Eigen::Index told = 6 + shifted + blocks, all = told + shared;
+  const Eigen::Index blocks = measurement_.size() - 6, all = 6 + shifted + blocks;
   Eigen::MatrixXd by_shifts(6, shifted);  // of the seen pose
   for (Eigen::Index i = 0; i < shifted; ++i) {
     out.parameters.push_back(shifts[static_cast<std::size_t>(i)].first);
@@ -189,29 +187,23 @@ ChainMeasurement FollowingBackEnd::by_parameters() const {
   for (const JointMeasurement::Block& block : measurement_.blocks())
     for (int i = 0; i < block.size; ++i)
       out.parameters.push_back(places_[static_cast<std::size_t>(block.id)] + i);
-  for (int i = first; i < SharedErrors::kCount; ++i) out.parameters.push_back(at.shared + i);
   const auto H = measurement_.information();
   const auto pose = H.topLeftCorner<6, 6>();
   const auto mixed = H.topRightCorner(6, blocks);
   const Eigen::Matrix<double, 6, Eigen::Dynamic> pose_shifts = pose * by_shifts;
-  out.information.setZero(all, all);
-  out.information.topLeftCorner(told, told) << pose, pose_shifts, mixed,  //
+  out.information.resize(all, all);
+  out.information << pose, pose_shifts, mixed,  //
       pose_shifts.transpose(), by_shifts.transpose() * pose_shifts, by_shifts.transpose() * mixed,
       mixed.transpose(), mixed.transpose() * by_shifts, H.bottomRightCorner(blocks, blocks);
-  const auto by_shared = measurement_.shared_errors().rightCols(shared);
-  out.information.topRightCorner(told, shared) << by_shared.topRows<6>(),
-      by_shifts.transpose() * by_shared.topRows<6>(), by_shared.bottomRows(blocks);
-  out.information.bottomLeftCorner(shared, told) = out.information.topRightCorner(told, shared).transpose();
   const auto b = measurement_.vector();
-  out.vector.setZero(all);
-  out.vector.head(told) << b.head<6>(), by_shifts.transpose() * b.head<6>(), b.tail(blocks);
+  out.vector.resize(all);
+  out.vector << b.head<6>(), by_shifts.transpose() * b.head<6>(), b.tail(blocks);
   return out;
 }
 
 void FollowingBackEnd::update(const PoseInformation& measurement, std::span<const ContourOffset> contours) {
   if (state_.t != trajectory_[next_ - 1].t) return;  // after the trajectory's end
   measurement_.start(measurement);
-  measurement_.expect_shared_errors(SharedErrors::kCount);
   add_contours(contours);
   if (contour_callback_) contour_callback_(state_, contours);
   chain_.measure(by_parameters());

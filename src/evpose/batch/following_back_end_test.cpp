@@ -39,9 +39,7 @@ FusionConfig settings() {
 class Flight {
  public:
   Flight(unsigned seed, double duration_s)
-      : random_(seed),
-        duration_s_(duration_s),
-        parameters_(settings(), StaticParameters::Shared::considered) {
+      : random_(seed), duration_s_(duration_s), parameters_(settings(), StaticParameters::Shared::estimated) {
     noise_.gyro_density = 2e-3, noise_.accel_density = 2e-2, noise_.gyro_walk = noise_.accel_walk = 1e-5;
     const FusionConfig config = settings();
     const CalibrationConfig& c = config.calibration;
@@ -151,11 +149,9 @@ class Flight {
   }
   /// What the flight's shared errors do to this contour.
   double shared_offset_px(const ContourOffset& contour) const {
-    JointMeasurement probe;
-    probe.start({});
-    probe.expect_shared_errors(SharedErrors::kCount);
-    SharedErrors::add(contour, {Vector6d::Unit(0), 1, 0, {}}, probe);
-    return probe.shared_errors().row(0).dot(shared_errors_);
+    double out = 0;
+    for (const auto& [number, px] : SharedErrors::on(contour)) out += px * shared_errors_(number);
+    return out;
   }
   void measure(FollowingBackEnd& follow, const AdjustedCamera& camera, const Pose& T_body_cam,
                PixelNoise& pixels) {

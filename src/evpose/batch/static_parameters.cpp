@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace evpose {
@@ -91,28 +90,13 @@ ParameterInformation StaticParameters::prior() const {
   return out;
 }
 
-/// The shared errors are held at zero, and what that costs is added to the covariance (Schmidt).
 ParameterSolution StaticParameters::solve(const ParameterInformation& of_recordings, double trust) const {
   ParameterInformation known = prior();
   known.S.topLeftCorner(calibration_size_, calibration_size_) *= trust;
   known.s.head(calibration_size_) *= trust;
   known.add(of_recordings);
-  std::vector<int> kept(static_cast<std::size_t>(calibration_size_)), shared(SharedErrors::kCount);
-  std::iota(kept.begin(), kept.end(), 0);
-  std::iota(shared.begin(), shared.end(), places_.shared);
-  for (const Segment& s : segments_) kept.push_back(s.place);
-  const auto n = static_cast<Eigen::Index>(kept.size());
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(known.S(kept, kept));
-  const Eigen::MatrixXd by_shared = -ldlt.solve(Eigen::MatrixXd(known.S(kept, shared)));
-  ParameterSolution out{Eigen::VectorXd::Zero(size_), Eigen::MatrixXd::Identity(size_, size_)};
-  const Eigen::VectorXd s = known.s(kept), z = ldlt.solve(s);
-  const Eigen::MatrixXd covariance =
-      ldlt.solve(Eigen::MatrixXd::Identity(n, n)) + by_shared * by_shared.transpose();
-  out.z(kept) = z;
-  out.covariance(kept, kept) = covariance;
-  out.covariance(kept, shared) = by_shared;
-  out.covariance(shared, kept) = by_shared.transpose();
-  return out;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(known.S);
+  return {ldlt.solve(known.s), ldlt.solve(Eigen::MatrixXd::Identity(size_, size_))};
 }
 
 Eigen::MatrixXd StaticParameters::calibration_correlation(Eigen::Index n, bool with_imu) const {

@@ -18,15 +18,16 @@ struct ParameterSolution {
   Eigen::MatrixXd covariance;
 };
 
-/// What does not change over the recordings: errors of the calibration and offsets of map segments, which are
-/// estimated with the trajectories, and, where it is asked for, errors that all contours share
-/// (SharedErrors), which are considered: they add to the covariance alone. Each has a place among the
-/// parameters of the ChainSmoother. Those that are estimated have a present value about which everything is
-/// linearised, and a prior about what was given, which stays whatever the present value.
+/// What does not change over the recordings and is estimated with the trajectories: errors of the
+/// calibration, offsets of map segments and, where it is asked for, errors that all contours share
+/// (SharedErrors). Each has a place among the parameters of the ChainSmoother, a present value about which
+/// everything is linearised, and a prior about what was given, which stays whatever the present value. What
+/// is measured does not depend on the value of the shared errors, so theirs stays zero and each pass finds
+/// them anew.
 class StaticParameters {
  public:
   /// What to make of errors that all contours share.
-  enum class Shared { left_out, considered };
+  enum class Shared { left_out, estimated };
   /// As a resolved FusionConfig asks for them.
   explicit StaticParameters(const FusionConfig& config, Shared shared = Shared::left_out);
 
@@ -39,17 +40,16 @@ class StaticParameters {
   const Places& places() const { return places_; }
   Eigen::Index intrinsics_count() const { return intrinsics_count_; }
   bool estimates_segments() const { return segments_config_.has_value(); }
-  /// Of the shared errors, the first that counts: a delay of all events is one of the time offset where that
-  /// is estimated.
-  int first_shared() const {
-    if (shared_ == Shared::left_out) return SharedErrors::kCount;
-    return places_.time ? 1 : 0;
+  /// Its place. None: they are left out; or a delay of all events, where the time offset is estimated.
+  std::optional<int> shared_error(int number) const {
+    if (shared_ == Shared::left_out || (number == 0 && places_.time)) return {};
+    return places_.shared + number;
   }
   /// Only if it estimates them.
   double segment_length_m() const { return segments_config_->length_m; }
   /// No contour says anything of the rest.
   bool takes_contours() const {
-    return places_.intrinsics || estimates_segments() || shared_ == Shared::considered;
+    return places_.intrinsics || estimates_segments() || shared_ == Shared::estimated;
   }
   /// The calibration's parameters come first.
   int calibration_size() const { return calibration_size_; }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kFilterRuns = 2;  // of the first recording: the second from what the first has found
 constexpr int kMostPasses = 12;
-constexpr double kStill = 0.1;          // change of a pass, in sigma, that is not worth another
+constexpr double kStill = 0.1;  // change of a pass, in sigma, that is not worth another
 constexpr double kTakenBack = 0.3, kShorter = 0.5, kLeastStep = 0.25;  // of steps that overshoot
 constexpr double kLeastTracking = 0.2;  // share of the updates: below it, it is another view that was found
 constexpr double kUnknown = 1e-4;       // trust in what was given, where the events shall speak alone
@@ -24,6 +24,17 @@ constexpr double kSteps = kFilterRuns + kMostPasses;
 double share_of_tracking(std::span<const Update> updates) {
   const auto good = std::ranges::count(updates, Health::tracking, &Update::health);
   return updates.empty() ? 0 : static_cast<double>(good) / static_cast<double>(updates.size());
+}
+
+/// What is found, as differences from what was given, with its sigma.
+std::string values_words(const StaticParameters& parameters) {
+  const Calibration& found = parameters.calibration();
+  std::string out = "numbers";
+  for (Eigen::Index i = 0; i < found.intrinsics.size(); ++i)
+    out += text(" ", found.intrinsics(i), " (", found.intrinsics_sigma(i), ")");
+  const Eigen::Vector3d turn_deg = so3::log(found.turn) * (180 / M_PI);
+  return out + text(", turn ", turn_deg.x(), " ", turn_deg.y(), " ", turn_deg.z(), " deg, time ",
+                    1e3 * found.time_offset_s, " ms");
 }
 
 /// Why poses are not `tracking`, as it was said last.
@@ -59,10 +70,11 @@ Status JointCalibration::begin_parameters() {
   auto fusion = resolved(job.config.tracker.fusion, states_errors(*job.map));
   if (!fusion) return fusion.error();
   choose_states(job.setup, *fusion);
-  const auto coarse = coarse_camera(job);
+  const auto coarse = coarse_camera(job, *fusion);
   if (!coarse) return coarse.error();
-  parameters_ = std::make_shared<StaticParameters>(*fusion, StaticParameters::Shared::considered);
+  parameters_ = std::make_shared<StaticParameters>(*fusion, StaticParameters::Shared::estimated);
   parameters_->add(*coarse);
+  log_detail(text("coarse: ", values_words(*parameters_)));
   return {};
 }
 
@@ -76,6 +88,8 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
       const auto told = [&](double share) { return go_on(progress, share); };
       if (auto ok = flight.filter(request, told); !ok) return ok;
       if (interrupted_) return {};
+      log_detail(text("filter: ", std::lround(100 * share_of_tracking(flight.updates())), " % tracking, ",
+                      values_words(*parameters_)));
       ++done_;
       if (!std::ranges::any_of(flight.updates(), &Update::accepted))
         return Error{jobs_[k].recording.folder, "the events never gathered at the map's contours",
@@ -150,10 +164,11 @@ Status JointCalibration::estimate(const TrackRequest& request, const Progress& p
   }
   for (std::size_t k = 0; k < size(); ++k)
     if (tracking_share(k) < kLeastTracking)
-      return Error{jobs_[k].recording.folder,
-                   text("with the best calibration found, ", std::lround(100 * tracking_share(k)),
-                        " % of the poses are tracking (", reason_of(flights_[k]->updates()), ")"),
-                   "give a better start pose or focal length, or a recording in which more of the map is in view"};
+      return Error{
+          jobs_[k].recording.folder,
+          text("with the best calibration found, ", std::lround(100 * tracking_share(k)),
+               " % of the poses are tracking (", reason_of(flights_[k]->updates()), ")"),
+          "give a better start pose or focal length, or a recording in which more of the map is in view"};
   return {};
 }
 

@@ -92,7 +92,8 @@ std::vector<FieldArrow> model_difference(const Camera& from, const Camera& to) {
   };
   std::vector<Ray> rays;
   const double step = static_cast<double>(size.width - 1) / (kGrid - 1);
-  for (double y = 0; y <= size.height - 1; y += step)
+  // The same on either side of the middle.
+  for (double y = 0.5 * std::fmod(size.height - 1, step); y <= size.height - 1; y += step)
     for (int i = 0; i < kGrid; ++i)
       if (const auto ray = to.unproject({i * step, y})) rays.push_back({{i * step, y}, *ray});
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();

@@ -10,8 +10,8 @@ namespace evpose {
 /// the start can bridge: over what the calibration's sigmas allow, that one with which the contours meet most
 /// edges in slices of events of the first tenths of a second. A grid of focal lengths, principal points and
 /// first radial terms at the start pose gives some, which are refined with all slices, at poses that the IMU
-/// gives. Where the given sigmas are narrow, what was given is found, with these. `fusion`: resolved settings.
-/// Error: those of the readers.
+/// gives. Where the given sigmas are narrow, what was given is found, with these. `fusion`: resolved
+/// settings. Error: those of the readers.
 Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fusion);
 
 }  // namespace evpose

@@ -33,7 +33,7 @@ UBUNTU_KEY = "F6ECB3762474EDA9D21B7022871920D1991BC93C"  # of its archive; no pa
 def run(*command, **more):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, stdin=subprocess.DEVNULL, **more)
     if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, command))}\nstatus {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+        sys.exit(f"{' '.join(map(str, command))}\nstatus {done.returncode}\n{done.stdout[-20000:]}{done.stderr[-20000:]}")
     return done.stdout
 
 
@@ -298,6 +298,7 @@ def rows(debs, counts):
 def tried(name):
     """What the page says of a distribution."""
     held = Held()
+    commit = run("git", "-C", ROOT, "rev-parse", "--short", "HEAD").strip()
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
         scratch.chmod(0o755)  # apt reads keys as another user
@@ -315,7 +316,6 @@ def tried(name):
         try_removal(system, held)
         try_wheel(system, wheel, held)
         table = list(rows(debs, counts))
-    commit = run("git", "-C", ROOT, "rev-parse", "--short", "HEAD").strip()
     return ["", f"Sources of commit `{commit}`.", "", "| package | section | MB | installed MiB | with its dependencies |",
             "|---|---|---|---|---|", *table, "", *(f"- {what}" for what in held), ""]
 

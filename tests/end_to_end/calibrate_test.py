@@ -43,7 +43,7 @@ class CalibrateTest(unittest.TestCase):
 
     def test_a_camera_that_is_far_off_is_found_and_every_command_reads_it(self):
         flight = self.root / "flight"
-        made = self.evpose("simulate", "turning_2", "-o", flight, "--duration", 0.6,
+        made = self.evpose("simulate", "turning_2", "-o", flight, "--duration", 1,
                            *(word for setting in TINY for word in ("--set", setting)))
         self.assertEqual(made.returncode, 0, made.stderr)
         truth = (flight / "camchain-imucam.yaml").read_text()
@@ -52,13 +52,13 @@ class CalibrateTest(unittest.TestCase):
         start = re.sub(r"distortion_coeffs: \[.*\]", "distortion_coeffs: [0, 0, 0, 0]", start)
         start = re.sub(r".*_sigma: .*\n", "", start)
         done = self.calibrate(flight, start, "--occluders", flight / "mesh.ply")
-        self.assertIn(done.returncode, (0, 1), done.stderr)
+        self.assertEqual(done.returncode, 0, done.stderr)
         chain = (self.root / "found.yaml").read_text()
         for key in ("intrinsics", "distortion_coeffs"):
             sigmas = numbers(chain, key.replace("_coeffs", "") + "_sigma")
             for found, sigma, number in zip(numbers(chain, key), sigmas, numbers(truth, key)):
                 self.assertLess(abs(found - number), 4 * sigma)
-        self.assertLess(abs(numbers(chain, "intrinsics")[0] / fx - 1), 0.005)
+        self.assertLess(abs(numbers(chain, "intrinsics")[0] / fx - 1), 0.002)
         self.assertIn("calibration_correlation", chain)
         self.assertIn("<svg", (self.root / "found.html").read_text())
         self.assertEqual(self.evpose("info", self.root / "found.yaml").returncode, 0)

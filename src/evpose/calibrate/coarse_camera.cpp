@@ -2,9 +2,13 @@
 #include "evpose/calibrate/coarse_camera.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "evpose/calibrate/event_slices.h"
 #include "evpose/camera/adjusted_camera.h"
@@ -19,33 +23,46 @@ constexpr double kBridged_px = 4;  // that the alignment of the start bridges: i
 constexpr double kReach = 2;       // sigmas to each side
 constexpr double kStep_px = 8;     // of the coarse grid: the reach of a coarse edge
 constexpr std::size_t kKept = 6;   // of its cameras are refined
-constexpr double kFineSteps_px[] = {6, 3, 1.5, 0.75};
-constexpr int kMostSweeps = 20;  // at each step
-constexpr double kSigma_px = 2;  // of each mode of what is found
+constexpr double kCoarseSteps_px[] = {8, 4}, kFineSteps_px[] = {6, 3, 1.5, 0.75};
+constexpr double kRollSigma_rad = 0.02;  // at least: that of a start pose
+constexpr int kMostSweeps = 20;          // at each step
+constexpr double kSigma_px = 2;          // of each mode of what is found
 constexpr std::size_t kSlices = 6;
 constexpr TimeNs kApart = 50 * kNsPerMs;  // slices; the pose follows from the IMU
+constexpr std::size_t kLaterSlices = 16;  // over a whole trajectory
+constexpr int kFarSteps[] = {-2, -1, 0, 1, 2};
+constexpr double kFarCubic_px = 8, kFarQuintic_px = 5;
+constexpr double kBetter = 0.002;  // mean score by which another camera has to be, to be another one
 constexpr double kStrideOfPoints_px = 8;
-constexpr int kPoints = 700;
+constexpr int kPoints = 1000;
+constexpr double kMarginOfWidth =
+    0.2;  // in which the given camera, without barrel distortion, sees the corners
 
-/// Changes of all numbers that move what is seen by up to one pixel, each in a way of its own: focal length,
-/// cubic and quintic radial terms without what lower ones can do (Zernike's radial polynomials), the
-/// principal point.
+/// What is tried: the intrinsic numbers, and last an angle about the optical axis, rad, which a principal
+/// point cannot stand in for as it can for the others.
+using Trial = Eigen::VectorXd;
+
+/// Changes that move what is seen by up to one pixel, each in a way of its own: focal length, cubic and
+/// quintic radial terms without what lower ones can do (Zernike's radial polynomials), principal point, roll.
 struct Modes {
-  Eigen::VectorXd focal, cubic, quintic, cx, cy;  ///< empty: the model has none
+  Eigen::VectorXd focal, cubic, quintic, cx, cy, roll;  ///< empty: the model has none
+  std::array<const Eigen::VectorXd*, 6> all() const { return {&focal, &cx, &cy, &roll, &cubic, &quintic}; }
 };
 
+/// `n`: of the intrinsic numbers.
 Modes modes_of(const CameraIntrinsics& camera, Eigen::Index n) {
   const double corner_px = 0.5 * std::hypot(camera.size.width, camera.size.height), r = corner_px / camera.fx;
   Modes out;
-  for (Eigen::VectorXd* mode : {&out.focal, &out.cx, &out.cy}) mode->setZero(n);
+  for (Eigen::VectorXd* mode : {&out.focal, &out.cx, &out.cy, &out.roll}) mode->setZero(n + 1);
   out.focal(0) = camera.fx / corner_px;
   out.focal(1) = camera.fy / corner_px;
   out.cx(2) = out.cy(3) = 1;
+  out.roll(n) = 1 / corner_px;
   // Double sphere has a shape of its own: it is left to the alignment.
   if (n < 6 || camera.distortion_model == "ds") return out;
   // 3 (r^3 - 2/3 r) and 10 (r^5 - 6/5 r^3 + 3/10 r), at most 1 in between.
-  const Eigen::VectorXd cube = Eigen::VectorXd::Unit(n, 4) / (corner_px * r * r),
-                        fifth = Eigen::VectorXd::Unit(n, 5) / (corner_px * r * r * r * r);
+  const Eigen::VectorXd cube = Eigen::VectorXd::Unit(n + 1, 4) / (corner_px * r * r),
+                        fifth = Eigen::VectorXd::Unit(n + 1, 5) / (corner_px * r * r * r * r);
   out.cubic = 3 * (cube - 2.0 / 3 * out.focal);
   out.quintic = 10 * (fifth - 1.2 * cube + 0.3 * out.focal);
   return out;
@@ -88,32 +105,35 @@ Expected<std::vector<Pose>> poses_at(const TrackJob& job, const FusionConfig& fu
 
 class Trials {
  public:
-  Trials(const TrackJob& job) : job_(job), camera_(*job.setup.intrinsics), index_(*job.map) {}
+  Trials(const TrackJob& job, const Pose& T_body_cam)
+      : job_(job), T_body_cam_(T_body_cam), camera_(*job.setup.intrinsics), index_(*job.map) {}
 
   void add(std::span<const FilteredEvent> events, const Pose& T_map_body) {
     VisibleSetConfig config = job_.config.tracker.visible;
     config.stride_px = kStrideOfPoints_px;
     config.budget = kPoints;
-    config.margin_px = kReach * kStep_px * 2;
-    views_.push_back({EdgeField(camera_.size), T_map_body * job_.setup.T_body_cam, {}});
+    config.margin_px = kMarginOfWidth * camera_.size.width;
+    views_.push_back({EdgeField(camera_.size), T_map_body * T_body_cam_, {}});
     View& view = views_.back();
     view.field.build(events);
     VisibleSet visible(index_, *job_.setup.camera, config);
     for (const std::uint32_t i : visible.choose(view.T_map_cam))
       view.points.push_back({job_.map->position(i), job_.map->points[i].tangent.cast<double>()});
   }
-  bool empty() const { return views_.empty(); }
 
-  /// In the first `views`.
-  double score(const Eigen::VectorXd& numbers, EdgeSpread spread, std::size_t views) const {
-    const auto camera = make_camera(corrected(camera_, numbers));
+  std::size_t size() const { return views_.size(); }
+
+  /// In the first `views`; their mean.
+  double score(const Trial& trial, EdgeSpread spread, std::size_t views) const {
+    const auto n = trial.size() - 1;
+    const auto camera = make_camera(corrected(camera_, trial.head(n)));
+    const Pose rolled{so3::exp({0, 0, trial(n)}), Eigen::Vector3d::Zero()};
     constexpr double kNone = -1e9;
     if (!camera) return kNone;
     double out = 0;
-    for (std::size_t i = 0; i < std::min(views, views_.size()); ++i)
-      out +=
-          score_pose({views_[i].field, **camera, identity_, views_[i].points}, views_[i].T_map_cam, spread);
-    return out;
+    for (std::size_t i = 0; i < views; ++i)
+      out += score_pose({views_[i].field, **camera, rolled, views_[i].points}, views_[i].T_map_cam, spread);
+    return out / static_cast<double>(views);
   }
 
  private:
@@ -123,19 +143,19 @@ class Trials {
     std::vector<SearchPoint> points;
   };
   const TrackJob& job_;
+  const Pose T_body_cam_;
   const CameraIntrinsics& camera_;
   ContourIndex index_;
-  const Pose identity_;
   std::vector<View> views_;
 };
 
-struct Trial {
-  Eigen::VectorXd numbers;
+struct Scored {
+  Trial trial;
   double score;
 };
 
 /// The best of a grid, that differ, best first.
-std::vector<Trial> best_of_grid(const Trials& trials, const Modes& modes, const Eigen::VectorXd& sigma) {
+std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const Eigen::VectorXd& sigma) {
   const auto count = [&](const Eigen::VectorXd& mode, Eigen::Index number) {
     return mode.size() == 0 ? 0
                             : static_cast<int>(std::ceil(kReach * sigma(number) / (kStep_px * mode(number))));
@@ -143,48 +163,94 @@ std::vector<Trial> best_of_grid(const Trials& trials, const Modes& modes, const 
   const int focal_count = count(modes.focal, 0), cubic_count = count(modes.cubic, 4),
             centre_count = count(modes.cx, 2);
   const Eigen::VectorXd cubic = cubic_count > 0 ? modes.cubic : Eigen::VectorXd::Zero(sigma.size());
-  std::vector<Trial> all;
+  std::vector<Scored> all;
   for (int f = -focal_count; f <= focal_count; ++f)
     for (int k = -cubic_count; k <= cubic_count; ++k)
       for (int x = -centre_count; x <= centre_count; ++x)
         for (int y = -centre_count; y <= centre_count; ++y) {
-          const Eigen::VectorXd numbers =
-              kStep_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
-          all.push_back({numbers, trials.score(numbers, EdgeSpread::coarse, 1)});
+          const Trial trial = kStep_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
+          all.push_back({trial, trials.score(trial, EdgeSpread::coarse, 1)});
         }
-  std::ranges::stable_sort(all, std::greater(), &Trial::score);
-  std::vector<Trial> out;
+  std::ranges::stable_sort(all, std::greater(), &Scored::score);
+  std::vector<Scored> out;
   // Neighbours in the grid lie within one step in each number.
   const Eigen::VectorXd step =
       1.5 * kStep_px * (modes.focal.cwiseAbs() + cubic.cwiseAbs() + modes.cx + modes.cy);
-  for (const Trial& t : all) {
-    const auto near = [&](const Trial& kept) {
-      return ((t.numbers - kept.numbers).cwiseAbs().array() <= step.array()).all();
+  for (const Scored& t : all) {
+    const auto near = [&](const Scored& kept) {
+      return ((t.trial - kept.trial).cwiseAbs().array() <= step.array()).all();
     };
     if (out.size() < kKept && std::ranges::none_of(out, near)) out.push_back(t);
   }
   return out;
 }
 
+/// What is not known of the given calibration, and how it is tried.
+struct Numbers {
+  explicit Numbers(const TrackJob& job) : job_(job), sigma(given().intrinsics_sigma) {
+    modes = modes_of(*job.setup.intrinsics, sigma.size());
+    reach.resize(sigma.size() + 1);
+    reach << sigma, std::max(kRollSigma_rad, given().turn_sigma_rad.maxCoeff());
+  }
+  Calibration given() const {
+    const CalibrationSigma& stated = *job_.setup.calibration_sigma;
+    Calibration out;
+    out.intrinsics_sigma = stated.of_intrinsics(*job_.setup.intrinsics);
+    out.intrinsics.setZero(out.intrinsics_sigma.size());
+    out.turn_sigma_rad = stated.of_rotation_rad();
+    out.shift_sigma_m = stated.of_translation_m();
+    return out;
+  }
+  bool beyond(const Trial& trial) const {
+    return (trial.cwiseAbs().array() > kReach * reach.array() + 1e-12).any();
+  }
+  /// Known to some pixels in each mode; tangential terms and higher radial ones are as they were.
+  void take(const Trial& trial, const Pose& T_body_cam, Calibration* found) const {
+    const Eigen::Index n = sigma.size();
+    found->intrinsics = trial.head(n);
+    const Eigen::Vector3d axis = T_body_cam.q * Eigen::Vector3d::UnitZ();
+    if (!given().turn_sigma_rad.isZero(0))
+      found->turn = (so3::exp(trial(n) * axis) * found->turn).normalized();
+    found->turn_sigma_rad = given().turn_sigma_rad;
+    Eigen::VectorXd square = Eigen::VectorXd::Zero(n);
+    for (const Eigen::VectorXd* mode : modes.all())
+      if (mode->size() > 0) square += (kSigma_px * mode->head(n)).cwiseAbs2();
+    found->intrinsics_sigma = sigma;
+    for (Eigen::Index i = 0; i < n; ++i)
+      if (square(i) > 0) found->intrinsics_sigma(i) = std::min(sigma(i), std::sqrt(square(i)));
+  }
+
+ private:
+  const TrackJob& job_;
+
+ public:
+  const Eigen::VectorXd sigma;
+  Modes modes;
+  Eigen::VectorXd reach;  ///< one sigma
+};
+
 /// Along each mode to and fro as long as it gets better, in ever smaller steps.
-Trial refined(const Trials& trials, const Modes& modes, const Eigen::VectorXd& sigma, Trial best) {
-  const auto score = [&](const Eigen::VectorXd& numbers) {
-    return trials.score(numbers, EdgeSpread::fine, kSlices);
-  };
-  best.score = score(best.numbers);
-  for (const double step_px : kFineSteps_px)
+void refine(const Trials& trials, const Numbers& numbers, EdgeSpread spread, std::span<const double> steps_px,
+            Scored* best) {
+  const auto score = [&](const Trial& trial) { return trials.score(trial, spread, trials.size()); };
+  best->score = score(best->trial);
+  for (const double step_px : steps_px)
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-      const double before = best.score;
-      for (const Eigen::VectorXd* mode : {&modes.focal, &modes.cx, &modes.cy, &modes.cubic, &modes.quintic})
+      const double before = best->score;
+      for (const Eigen::VectorXd* mode : numbers.modes.all())
         for (const double step : {step_px, -step_px}) {
           if (mode->size() == 0) continue;
-          const Eigen::VectorXd numbers = best.numbers + step * *mode;
-          if ((numbers.cwiseAbs().array() > kReach * sigma.array() + 1e-12).any()) continue;
-          if (const double here = score(numbers); here > best.score) best = {numbers, here};
+          const Trial trial = best->trial + step * *mode;
+          if (numbers.beyond(trial)) continue;
+          if (const double here = score(trial); here > best->score) *best = {trial, here};
         }
-      if (best.score <= before) break;
+      if (best->score <= before) break;
     }
-  return best;
+}
+
+void refine(const Trials& trials, const Numbers& numbers, Scored* best) {
+  refine(trials, numbers, EdgeSpread::coarse, kCoarseSteps_px, best);
+  refine(trials, numbers, EdgeSpread::fine, kFineSteps_px, best);
 }
 
 /// Slices of the first tenths of a second.
@@ -207,6 +273,32 @@ Status add_slices(const TrackJob& job, const FusionConfig& fusion, Trials* trial
   return {};
 }
 
+/// Between two of its states, or that of its end.
+Pose pose_of(std::span<const FusionState> trajectory, TimeNs t) {
+  const auto after = std::ranges::lower_bound(trajectory, t, {}, &FusionState::t);
+  if (after == trajectory.begin()) return after->nav.T_map_body;
+  const FusionState& before = *(after - 1);
+  if (after == trajectory.end()) return before.nav.T_map_body;
+  const double share = to_seconds(t - before.t) / to_seconds(after->t - before.t);
+  return before.nav.T_map_body.plus(share * after->nav.T_map_body.minus(before.nav.T_map_body));
+}
+
+/// Slices of a whole trajectory.
+Status add_slices_along(const TrackJob& job, std::span<const FusionState> trajectory, Trials* trials) {
+  auto reader = open_events(job.recording);
+  if (!reader) return reader.error();
+  EventSlices slices(**reader, job.setup.intrinsics->size);
+  const TimeNs first = trajectory.front().t, last = trajectory.back().t;
+  for (std::size_t k = 0; k < kLaterSlices; ++k) {
+    const TimeNs from = first + (last - first) / TimeNs{kLaterSlices} * static_cast<TimeNs>(k);
+    const auto more = slices.next(std::max(from, slices.end()));
+    if (!more) return more.error();
+    if (!*more || slices.end() > last) break;
+    if (!slices.sparse()) trials->add(slices.events(), pose_of(trajectory, slices.middle()));
+  }
+  return {};
+}
+
 /// By how many pixels the given numbers may be off at the rim.
 double uncertain_px(const CameraIntrinsics& camera, const Eigen::VectorXd& sigma) {
   return std::max(sigma(0) / camera.fx * 0.5 * camera.size.width, sigma(2));
@@ -215,31 +307,46 @@ double uncertain_px(const CameraIntrinsics& camera, const Eigen::VectorXd& sigma
 }  // namespace
 
 Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fusion) {
-  const CameraIntrinsics& camera = *job.setup.intrinsics;
-  const CalibrationSigma& given = *job.setup.calibration_sigma;
-  Calibration out;
-  const Eigen::VectorXd sigma = given.of_intrinsics(camera);
-  out.intrinsics.setZero(sigma.size());
-  out.intrinsics_sigma = sigma;
-  out.turn_sigma_rad = given.of_rotation_rad();
-  out.shift_sigma_m = given.of_translation_m();
-  if (uncertain_px(camera, sigma) < kBridged_px) return out;
-  Trials trials(job);
+  const Numbers numbers(job);
+  Calibration out = numbers.given();
+  if (uncertain_px(*job.setup.intrinsics, out.intrinsics_sigma) < kBridged_px) return out;
+  Trials trials(job, job.setup.T_body_cam);
   if (auto ok = add_slices(job, fusion, &trials); !ok) return ok.error();
-  if (trials.empty()) return out;
-  const Modes modes = modes_of(camera, sigma.size());
-  std::optional<Trial> best;
-  for (const Trial& start : best_of_grid(trials, modes, sigma))
-    if (Trial trial = refined(trials, modes, sigma, start); !best || trial.score > best->score)
-      best = std::move(trial);
-  out.intrinsics = best->numbers;
-  // To some pixels in each mode; tangential terms and higher radial ones are as they were.
-  Eigen::VectorXd square = Eigen::VectorXd::Zero(sigma.size());
-  for (const Eigen::VectorXd* mode : {&modes.focal, &modes.cx, &modes.cy, &modes.cubic, &modes.quintic})
-    if (mode->size() > 0) square += (kSigma_px * *mode).cwiseAbs2();
-  for (Eigen::Index i = 0; i < sigma.size(); ++i)
-    if (square(i) > 0) out.intrinsics_sigma(i) = std::min(sigma(i), std::sqrt(square(i)));
+  if (trials.size() == 0) return out;
+  std::optional<Scored> best;
+  for (Scored tried : best_of_grid(trials, numbers.modes, numbers.reach)) {
+    refine(trials, numbers, &tried);
+    if (!best || tried.score > best->score) best = std::move(tried);
+  }
+  numbers.take(best->trial, job.setup.T_body_cam, &out);
   return out;
+}
+
+Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionState> trajectory,
+                                   Calibration* found) {
+  const Numbers numbers(job);
+  if (numbers.modes.cubic.size() == 0 ||
+      uncertain_px(*job.setup.intrinsics, numbers.given().intrinsics_sigma) < kBridged_px)
+    return false;
+  const Pose T_body_cam{found->turn * job.setup.T_body_cam.q, job.setup.T_body_cam.p + found->shift};
+  Trials trials(job, T_body_cam);
+  if (auto ok = add_slices_along(job, trajectory, &trials); !ok) return ok.error();
+  if (trials.size() == 0) return false;
+  Scored here{Trial::Zero(found->intrinsics.size() + 1), 0};
+  here.trial.head(found->intrinsics.size()) = found->intrinsics;
+  refine(trials, numbers, &here);
+  std::optional<Scored> best;
+  for (const int k : kFarSteps)
+    for (const int l : kFarSteps) {
+      Scored tried = here;
+      tried.trial += k * kFarCubic_px * numbers.modes.cubic + l * kFarQuintic_px * numbers.modes.quintic;
+      if ((k == 0 && l == 0) || numbers.beyond(tried.trial)) continue;
+      refine(trials, numbers, &tried);
+      if (!best || tried.score > best->score) best = std::move(tried);
+    }
+  if (!best || best->score < here.score + kBetter) return false;
+  numbers.take(best->trial, T_body_cam, found);
+  return true;
 }
 
 }  // namespace evpose

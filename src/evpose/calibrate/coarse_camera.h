@@ -14,4 +14,10 @@ namespace evpose {
 /// settings. Error: those of the readers.
 Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fusion);
 
+/// The same once a trajectory is there: `found`, which the filter has come to, is compared over all of the
+/// flight with cameras that differ in the radial terms, as far as the given sigmas allow. True: another one
+/// is found, since contours meet clearly more edges with it.
+Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionState> trajectory,
+                                   Calibration* found);
+
 }  // namespace evpose

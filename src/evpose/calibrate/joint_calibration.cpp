@@ -15,6 +15,10 @@ namespace {
 
 constexpr int kFilterRuns = 2;  // of the first recording: the second from what the first has found
 constexpr int kMostPasses = 12;
+// Share of what is measured that counts: what contours are off by lasts as long as they are in view, which
+// adds up over a flight in what does not change and hardly in its poses. docs/decisions/fusion.md has the
+// figures.
+constexpr double kIndependent = 0.5;
 constexpr double kStill = 0.1;  // change of a pass, in sigma, that is not worth another
 constexpr double kTakenBack = 0.3, kShorter = 0.5, kLeastStep = 0.25;  // of steps that overshoot
 constexpr double kLeastTracking = 0.2;  // share of the updates: below it, it is another view that was found
@@ -78,6 +82,23 @@ Status JointCalibration::begin_parameters() {
   return {};
 }
 
+/// Whether the first flight, as the filter has it, shows another camera than the start did.
+Status JointCalibration::look_along_flight() {
+  const Calibration before = parameters_->calibration();
+  Calibration found = before;
+  const auto other = coarse_camera_along(jobs_.front(), flights_.front()->trajectory(), &found);
+  if (!other) return other.error();
+  if (!*other) return {};
+  found.intrinsics -= before.intrinsics;
+  found.turn = found.turn * before.turn.conjugate();
+  found.shift.setZero();
+  found.time_offset_s = 0;
+  found.gravity_tilt_rad.setZero();
+  parameters_->add(found);
+  log_detail(text("along the flight: ", values_words(*parameters_)));
+  return {};
+}
+
 /// The trajectories to begin with.
 Status JointCalibration::begin(const TrackRequest& request, const Progress& progress) {
   if (auto ok = begin_parameters(); !ok) return ok;
@@ -94,6 +115,8 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
       if (!std::ranges::any_of(flight.updates(), &Update::accepted))
         return Error{jobs_[k].recording.folder, "the events never gathered at the map's contours",
                      "check the start pose, the map and the focal length"};
+      if (k == 0 && run == 0)
+        if (auto ok = look_along_flight(); !ok) return ok;
     }
     flight_residuals_.emplace_back(residuals_);
     flight.on_contours([this, k](const FusionState&, std::span<const ContourOffset> contours) {
@@ -117,6 +140,8 @@ Expected<double> JointCalibration::pass(const Progress& progress) {
     told.add(*told_by_one);
     ++done_;
   }
+  told.S *= kIndependent;
+  told.s *= kIndependent;
   judge_given(told);
   ParameterSolution solution = parameters_->solve(told);
   double change = parameters_->change(solution);

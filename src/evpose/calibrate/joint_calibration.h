@@ -45,6 +45,7 @@ class JointCalibration {
 
  private:
   Status begin_parameters();
+  Status look_along_flight();
   Status begin(const TrackRequest& request, const Progress& progress);
   Expected<double> pass(const Progress& progress);
   double share_of_step(const ParameterSolution& solution);

@@ -155,14 +155,13 @@ struct Scored {
 };
 
 /// The best of a grid, that differ, best first.
-std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const Eigen::VectorXd& sigma) {
-  const auto count = [&](const Eigen::VectorXd& mode, Eigen::Index number) {
-    return mode.size() == 0 ? 0
-                            : static_cast<int>(std::ceil(kReach * sigma(number) / (kStep_px * mode(number))));
+std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const Trial& reach) {
+  const auto count = [&](const Trial& mode, Eigen::Index number) {
+    return mode.size() == 0 ? 0 : static_cast<int>(std::ceil(reach(number) / (kStep_px * mode(number))));
   };
   const int focal_count = count(modes.focal, 0), cubic_count = count(modes.cubic, 4),
             centre_count = count(modes.cx, 2);
-  const Eigen::VectorXd cubic = cubic_count > 0 ? modes.cubic : Eigen::VectorXd::Zero(sigma.size());
+  const Trial cubic = cubic_count > 0 ? modes.cubic : Trial::Zero(reach.size());
   std::vector<Scored> all;
   for (int f = -focal_count; f <= focal_count; ++f)
     for (int k = -cubic_count; k <= cubic_count; ++k)
@@ -185,72 +184,69 @@ std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const
   return out;
 }
 
+Calibration given_calibration(const TrackJob& job) {
+  const CalibrationSigma& stated = *job.setup.calibration_sigma;
+  Calibration out;
+  out.intrinsics_sigma = stated.of_intrinsics(*job.setup.intrinsics);
+  out.intrinsics.setZero(out.intrinsics_sigma.size());
+  out.turn_sigma_rad = stated.of_rotation_rad();
+  out.shift_sigma_m = stated.of_translation_m();
+  return out;
+}
+
 /// What is not known of the given calibration, and how it is tried.
-struct Numbers {
-  explicit Numbers(const TrackJob& job) : job_(job), sigma(given().intrinsics_sigma) {
-    modes = modes_of(*job.setup.intrinsics, sigma.size());
-    reach.resize(sigma.size() + 1);
-    reach << sigma, std::max(kRollSigma_rad, given().turn_sigma_rad.maxCoeff());
+struct Unknowns {
+  explicit Unknowns(const TrackJob& job)
+      : given(given_calibration(job)), modes(modes_of(*job.setup.intrinsics, given.intrinsics.size())) {
+    reach.resize(given.intrinsics.size() + 1);
+    reach << kReach * given.intrinsics_sigma,
+        kReach * std::max(kRollSigma_rad, given.turn_sigma_rad.maxCoeff());
   }
-  Calibration given() const {
-    const CalibrationSigma& stated = *job_.setup.calibration_sigma;
-    Calibration out;
-    out.intrinsics_sigma = stated.of_intrinsics(*job_.setup.intrinsics);
-    out.intrinsics.setZero(out.intrinsics_sigma.size());
-    out.turn_sigma_rad = stated.of_rotation_rad();
-    out.shift_sigma_m = stated.of_translation_m();
-    return out;
-  }
-  bool beyond(const Trial& trial) const {
-    return (trial.cwiseAbs().array() > kReach * reach.array() + 1e-12).any();
-  }
+
+  Calibration given;
+  Modes modes;
+  Trial reach;
+
+  bool beyond(const Trial& trial) const { return (trial.cwiseAbs().array() > reach.array() + 1e-12).any(); }
   /// Known to some pixels in each mode; tangential terms and higher radial ones are as they were.
   void take(const Trial& trial, const Pose& T_body_cam, Calibration* found) const {
-    const Eigen::Index n = sigma.size();
+    const Eigen::Index n = given.intrinsics.size();
     found->intrinsics = trial.head(n);
     const Eigen::Vector3d axis = T_body_cam.q * Eigen::Vector3d::UnitZ();
-    if (!given().turn_sigma_rad.isZero(0))
-      found->turn = (so3::exp(trial(n) * axis) * found->turn).normalized();
-    found->turn_sigma_rad = given().turn_sigma_rad;
+    if (!given.turn_sigma_rad.isZero(0)) found->turn = (so3::exp(trial(n) * axis) * found->turn).normalized();
+    found->turn_sigma_rad = given.turn_sigma_rad;
     Eigen::VectorXd square = Eigen::VectorXd::Zero(n);
     for (const Eigen::VectorXd* mode : modes.all())
       if (mode->size() > 0) square += (kSigma_px * mode->head(n)).cwiseAbs2();
-    found->intrinsics_sigma = sigma;
+    found->intrinsics_sigma = given.intrinsics_sigma;
     for (Eigen::Index i = 0; i < n; ++i)
-      if (square(i) > 0) found->intrinsics_sigma(i) = std::min(sigma(i), std::sqrt(square(i)));
+      if (square(i) > 0)
+        found->intrinsics_sigma(i) = std::min(given.intrinsics_sigma(i), std::sqrt(square(i)));
   }
-
- private:
-  const TrackJob& job_;
-
- public:
-  const Eigen::VectorXd sigma;
-  Modes modes;
-  Eigen::VectorXd reach;  ///< one sigma
 };
 
 /// Along each mode to and fro as long as it gets better, in ever smaller steps.
-void refine(const Trials& trials, const Numbers& numbers, EdgeSpread spread, std::span<const double> steps_px,
-            Scored* best) {
+void refine(const Trials& trials, const Unknowns& unknowns, EdgeSpread spread,
+            std::span<const double> steps_px, Scored* best) {
   const auto score = [&](const Trial& trial) { return trials.score(trial, spread, trials.size()); };
   best->score = score(best->trial);
   for (const double step_px : steps_px)
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
       const double before = best->score;
-      for (const Eigen::VectorXd* mode : numbers.modes.all())
+      for (const Eigen::VectorXd* mode : unknowns.modes.all())
         for (const double step : {step_px, -step_px}) {
           if (mode->size() == 0) continue;
           const Trial trial = best->trial + step * *mode;
-          if (numbers.beyond(trial)) continue;
+          if (unknowns.beyond(trial)) continue;
           if (const double here = score(trial); here > best->score) *best = {trial, here};
         }
       if (best->score <= before) break;
     }
 }
 
-void refine(const Trials& trials, const Numbers& numbers, Scored* best) {
-  refine(trials, numbers, EdgeSpread::coarse, kCoarseSteps_px, best);
-  refine(trials, numbers, EdgeSpread::fine, kFineSteps_px, best);
+void refine(const Trials& trials, const Unknowns& unknowns, Scored* best) {
+  refine(trials, unknowns, EdgeSpread::coarse, kCoarseSteps_px, best);
+  refine(trials, unknowns, EdgeSpread::fine, kFineSteps_px, best);
 }
 
 /// Slices of the first tenths of a second.
@@ -307,26 +303,26 @@ double uncertain_px(const CameraIntrinsics& camera, const Eigen::VectorXd& sigma
 }  // namespace
 
 Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fusion) {
-  const Numbers numbers(job);
-  Calibration out = numbers.given();
+  const Unknowns unknowns(job);
+  Calibration out = unknowns.given;
   if (uncertain_px(*job.setup.intrinsics, out.intrinsics_sigma) < kBridged_px) return out;
   Trials trials(job, job.setup.T_body_cam);
   if (auto ok = add_slices(job, fusion, &trials); !ok) return ok.error();
   if (trials.size() == 0) return out;
   std::optional<Scored> best;
-  for (Scored tried : best_of_grid(trials, numbers.modes, numbers.reach)) {
-    refine(trials, numbers, &tried);
+  for (Scored tried : best_of_grid(trials, unknowns.modes, unknowns.reach)) {
+    refine(trials, unknowns, &tried);
     if (!best || tried.score > best->score) best = std::move(tried);
   }
-  numbers.take(best->trial, job.setup.T_body_cam, &out);
+  unknowns.take(best->trial, job.setup.T_body_cam, &out);
   return out;
 }
 
 Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionState> trajectory,
                                    Calibration* found) {
-  const Numbers numbers(job);
-  if (numbers.modes.cubic.size() == 0 ||
-      uncertain_px(*job.setup.intrinsics, numbers.given().intrinsics_sigma) < kBridged_px)
+  const Unknowns unknowns(job);
+  if (unknowns.modes.cubic.size() == 0 ||
+      uncertain_px(*job.setup.intrinsics, unknowns.given.intrinsics_sigma) < kBridged_px)
     return false;
   const Pose T_body_cam{found->turn * job.setup.T_body_cam.q, job.setup.T_body_cam.p + found->shift};
   Trials trials(job, T_body_cam);
@@ -334,18 +330,18 @@ Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionSt
   if (trials.size() == 0) return false;
   Scored here{Trial::Zero(found->intrinsics.size() + 1), 0};
   here.trial.head(found->intrinsics.size()) = found->intrinsics;
-  refine(trials, numbers, &here);
+  refine(trials, unknowns, &here);
   std::optional<Scored> best;
   for (const int k : kFarSteps)
     for (const int l : kFarSteps) {
       Scored tried = here;
-      tried.trial += k * kFarCubic_px * numbers.modes.cubic + l * kFarQuintic_px * numbers.modes.quintic;
-      if ((k == 0 && l == 0) || numbers.beyond(tried.trial)) continue;
-      refine(trials, numbers, &tried);
+      tried.trial += k * kFarCubic_px * unknowns.modes.cubic + l * kFarQuintic_px * unknowns.modes.quintic;
+      if ((k == 0 && l == 0) || unknowns.beyond(tried.trial)) continue;
+      refine(trials, unknowns, &tried);
       if (!best || tried.score > best->score) best = std::move(tried);
     }
   if (!best || best->score < here.score + kBetter) return false;
-  numbers.take(best->trial, T_body_cam, found);
+  unknowns.take(best->trial, T_body_cam, found);
   return true;
 }
 

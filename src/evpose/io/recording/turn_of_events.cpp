@@ -17,8 +17,7 @@ constexpr double kTurned_px = 6;  // in the middle of the image, over a stretch
 constexpr double kLongest_s = 0.03, kShortest_s = 0.002;
 constexpr std::size_t kEvents = 40'000, kLeastEvents = 2'000;  // of a stretch; more are thinned
 constexpr int kCell_px = 8;                                    // in which the flow is taken as constant
-constexpr double kExplainedShare = 0.4;  // by the axes as read, of what the best ones explain
-constexpr double kSharper = 0.85;        // blur with the best axes, of that without any turn
+constexpr double kSharper = 0.7;  // blur with the best axes, of that with those that were read, or none
 
 struct Stretch {
   TimeNs begin = 0, end = 0;
@@ -95,7 +94,7 @@ class Flow {
       }
   }
 
-  /// Events over the mean number of them that each has for company at its pixel, when all are turned back to
+  /// One over the mean number of events that each has for company at its pixel, when all are turned back to
   /// the middle of the stretch: small for a sharp picture.
   double blur(const Stretch& s, const Eigen::Vector3d& rate) const {
     std::vector<Eigen::Vector2d> flow(by_rate_.size());
@@ -103,7 +102,7 @@ class Flow {
     std::vector<std::uint16_t> counts(static_cast<std::size_t>(size_.width) *
                                       static_cast<std::size_t>(size_.height));
     const TimeNs middle = s.begin + (s.end - s.begin) / 2;
-    double square = 0, inside = 0;
+    double pairs = 0, inside = 0;
     for (const auto& [t, e] : s.events) {
       const double later_s = to_seconds(middle - t);
       const Eigen::Vector2d& f = flow[static_cast<std::size_t>(e.y / kCell_px * columns_ + e.x / kCell_px)];
@@ -112,11 +111,11 @@ class Flow {
       if (x < 0 || y < 0 || x >= size_.width || y >= size_.height) continue;
       std::uint16_t& n = counts[static_cast<std::size_t>(y) * static_cast<std::size_t>(size_.width) +
                                 static_cast<std::size_t>(x)];
-      square += 2 * n + 1;
+      pairs += 2 * n;
       n = static_cast<std::uint16_t>(n + 1);
       ++inside;
     }
-    return square > 0 ? inside / square : 1;
+    return inside / (pairs + 1);
   }
 
  private:
@@ -142,9 +141,7 @@ Expected<std::optional<Error>> doubt_gyro_by_events(EventReader& events, const C
   };
   const AxisChoice choice = choose_axes(mean_blur);
   const double still = mean_blur(Eigen::Matrix3d::Zero());
-  const bool sharp = choice.cost < kSharper * still;
-  const bool explained = still - choice.as_read > kExplainedShare * (still - choice.cost);
-  if (!sharp || explained || choice.names.isIdentity()) return std::optional<Error>();
+  if (choice.cost > kSharper * std::min(still, choice.as_read)) return std::optional<Error>();
   Error doubt = wrong_axes(where, "gyroscope", "the turn of the events", choice.names);
   doubt.fix += "; or the rotation of T_cam_imu is wrong, or its inverse";
   return std::optional<Error>(std::move(doubt));

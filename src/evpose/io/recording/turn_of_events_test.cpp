@@ -12,7 +12,7 @@ namespace evpose {
 namespace {
 
 const CameraIntrinsics kCamera{180, 180, 119.5, 89.5, "none", {}, {240, 180}};
-constexpr double kStep_s = 2.5e-4, kDuration_s = 2;
+constexpr double kStep_s = 1e-3, kDuration_s = 1.5;
 
 /// The camera looks along the body's x; y is left, z up.
 Eigen::Matrix3d R_cam_imu() { return (Eigen::Matrix3d() << 0, -1, 0, 0, 0, -1, 1, 0, 0).finished(); }
@@ -27,7 +27,7 @@ class Stars final : public EventReader {
   /// `turning`: else the camera stays and events come anywhere.
   explicit Stars(bool turning) : camera_(*make_camera(kCamera)), turning_(turning) {
     std::normal_distribution<double> normal;
-    for (int i = 0; i < 6000; ++i) {
+    for (int i = 0; i < 9000; ++i) {
       const double x = normal(random_), y = normal(random_), z = normal(random_);
       stars_.push_back(Eigen::Vector3d(x, y, z).normalized());
     }
@@ -77,7 +77,7 @@ std::string said(const Eigen::Matrix3d& of_read, bool turning = true) {
   }
   Stars stars(turning);
   const auto doubt = doubt_gyro_by_events(stars, **make_camera(kCamera), R_cam_imu(), samples, "imu.csv");
-  EXPECT_TRUE(doubt.has_value());
+  EXPECT_TRUE(doubt ? true : false);
   return doubt && *doubt ? (*doubt)->line() : "";
 }
 

@@ -226,10 +226,9 @@ void check_imu(Checklist& list, const CheckedRecording& data) {
     doubts.push_back(**doubt);
   for (const Error& doubt : doubts) list.problem("IMU", doubt);
   if (doubts.empty())
-    list.ok("IMU",
-            text("mean |a| ", fixed(s.mean_accel_norm, 2), " m/s^2; ",
-                 data.truth.empty() ? "gravity" : "the ground truth",
-                 " and the turn of the events do not contradict its axes"));
+    list.ok("IMU", text("mean |a| ", fixed(s.mean_accel_norm, 2), " m/s^2; ",
+                        data.truth.empty() ? "gravity" : "the ground truth",
+                        " and the turn of the events do not contradict its axes"));
 }
 
 void check_calibration(Checklist& list, const CheckedRecording& data) {

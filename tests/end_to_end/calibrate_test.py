@@ -17,6 +17,7 @@ except ImportError as missing:
 from recording import CALIBRATION, Recording
 
 EVPOSE = None
+SCENARIO = pathlib.Path(__file__).resolve().parents[2] / "scenarios/turning_2.yaml"
 TINY = ["camera.size=custom", "camera.width=320", "camera.height=240", "camera.focal_px=190"]
 
 
@@ -43,7 +44,7 @@ class CalibrateTest(unittest.TestCase):
 
     def test_a_camera_that_is_far_off_is_found_and_every_command_reads_it(self):
         flight = self.root / "flight"
-        made = self.evpose("simulate", "turning_2", "-o", flight, "--duration", 1,
+        made = self.evpose("simulate", SCENARIO, "-o", flight, "--duration", 1,
                            *(word for setting in TINY for word in ("--set", setting)))
         self.assertEqual(made.returncode, 0, made.stderr)
         truth = (flight / "camchain-imucam.yaml").read_text()

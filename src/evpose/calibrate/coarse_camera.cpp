@@ -12,6 +12,7 @@
 
 #include "evpose/calibrate/event_slices.h"
 #include "evpose/camera/adjusted_camera.h"
+#include "evpose/core/log.h"
 #include "evpose/fusion/state_propagator.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/pose_search.h"
@@ -34,7 +35,7 @@ constexpr int kFarSteps[] = {-2, -1, 0, 1, 2};
 constexpr double kFarCubic_px = 8, kFarQuintic_px = 5;
 constexpr double kBetter = 0.002;  // mean score by which another camera has to be, to be another one
 constexpr double kStrideOfPoints_px = 8;
-constexpr int kPoints = 1000;
+constexpr int kPoints = 700;
 constexpr double kMarginOfWidth =
     0.2;  // in which the given camera, without barrel distortion, sees the corners
 
@@ -105,14 +106,19 @@ Expected<std::vector<Pose>> poses_at(const TrackJob& job, const FusionConfig& fu
 
 class Trials {
  public:
-  Trials(const TrackJob& job, const Pose& T_body_cam)
-      : job_(job), T_body_cam_(T_body_cam), camera_(*job.setup.intrinsics), index_(*job.map) {}
+  /// Points so far outside of the given camera's image are tried, too.
+  Trials(const TrackJob& job, const Pose& T_body_cam, double margin_px)
+      : job_(job),
+        T_body_cam_(T_body_cam),
+        margin_px_(margin_px),
+        camera_(*job.setup.intrinsics),
+        index_(*job.map) {}
 
   void add(std::span<const FilteredEvent> events, const Pose& T_map_body) {
     VisibleSetConfig config = job_.config.tracker.visible;
     config.stride_px = kStrideOfPoints_px;
     config.budget = kPoints;
-    config.margin_px = kMarginOfWidth * camera_.size.width;
+    config.margin_px = margin_px_;
     views_.push_back({EdgeField(camera_.size), T_map_body * T_body_cam_, {}});
     View& view = views_.back();
     view.field.build(events);
@@ -144,6 +150,7 @@ class Trials {
   };
   const TrackJob& job_;
   const Pose T_body_cam_;
+  const double margin_px_;
   const CameraIntrinsics& camera_;
   ContourIndex index_;
   std::vector<View> views_;
@@ -303,15 +310,16 @@ double uncertain_px(const CameraIntrinsics& camera, const Eigen::VectorXd& sigma
 }  // namespace
 
 Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fusion) {
-  const Unknowns unknowns(job);
+  Unknowns unknowns(job);
+  unknowns.modes.roll.resize(0);  // the start's pose and the mounting have more than one way to be off
   Calibration out = unknowns.given;
   if (uncertain_px(*job.setup.intrinsics, out.intrinsics_sigma) < kBridged_px) return out;
-  Trials trials(job, job.setup.T_body_cam);
+  Trials trials(job, job.setup.T_body_cam, 2 * kReach * kStep_px);
   if (auto ok = add_slices(job, fusion, &trials); !ok) return ok.error();
   if (trials.size() == 0) return out;
   std::optional<Scored> best;
   for (Scored tried : best_of_grid(trials, unknowns.modes, unknowns.reach)) {
-    refine(trials, unknowns, &tried);
+    refine(trials, unknowns, EdgeSpread::fine, kFineSteps_px, &tried);
     if (!best || tried.score > best->score) best = std::move(tried);
   }
   unknowns.take(best->trial, job.setup.T_body_cam, &out);
@@ -325,7 +333,7 @@ Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionSt
       uncertain_px(*job.setup.intrinsics, unknowns.given.intrinsics_sigma) < kBridged_px)
     return false;
   const Pose T_body_cam{found->turn * job.setup.T_body_cam.q, job.setup.T_body_cam.p + found->shift};
-  Trials trials(job, T_body_cam);
+  Trials trials(job, T_body_cam, kMarginOfWidth * job.setup.intrinsics->size.width);
   if (auto ok = add_slices_along(job, trajectory, &trials); !ok) return ok.error();
   if (trials.size() == 0) return false;
   Scored here{Trial::Zero(found->intrinsics.size() + 1), 0};
@@ -340,6 +348,9 @@ Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionSt
       refine(trials, unknowns, &tried);
       if (!best || tried.score > best->score) best = std::move(tried);
     }
+  if (best)
+    log_detail(text("cameras along the flight: ", here.score, " as found, ", best->score,
+                    " with other radial terms"));
   if (!best || best->score < here.score + kBetter) return false;
   unknowns.take(best->trial, T_body_cam, found);
   return true;

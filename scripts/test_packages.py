@@ -206,7 +206,8 @@ def taken(system, folder, without_network):
     """The packages and the wheel, copied out. npm 8 of Ubuntu 22.04 asks its registry even for what it has kept."""
     if sorted(packages_of(system)) != sorted(ORDER):
         sys.exit(f"other packages are made: {sorted(packages_of(system))}")
-    system.run("sh", "-ec", "cd /evpose && " + ("unshare --net " if without_network else "") + "pip wheel --no-index --no-build-isolation --no-deps -w /wheel .",
+    alone = "unshare --net " if without_network else ""
+    system.run("sh", "-ec", f"cd /evpose && {alone}pip wheel --no-index --no-build-isolation --no-deps -w /wheel .",
                CMAKE_CXX_COMPILER_LAUNCHER="ccache", CCACHE_SLOPPINESS="pch_defines,time_macros")
     folder.mkdir()
     wheel, = (system.folder / "wheel").glob("evpose-*.whl")

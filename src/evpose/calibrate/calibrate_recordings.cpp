@@ -69,7 +69,7 @@ Expected<std::vector<TrackJob>> jobs_of(const CalibrateRequest& request) {
 FlightMotion motion_of(const JointCalibration& joint, std::size_t k) {
   FlightMotion out;
   out.name = joint.job(k).recording.name;
-  out.tracking = joint.tracking_share(k);
+  out.accepted = joint.accepted_share(k);
   out.coverage = joint.residuals_of(k).coverage();
   const std::vector<FusionState>& states = joint.flight(k).trajectory();
   out.duration_s = to_seconds(states.back().t - states.front().t);

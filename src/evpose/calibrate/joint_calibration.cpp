@@ -21,12 +21,12 @@ constexpr int kMostPasses = 12;
 constexpr double kIndependent = 0.5;
 constexpr double kStill = 0.1;  // change of a pass, in sigma, that is not worth another
 constexpr double kTakenBack = 0.3, kShorter = 0.5, kLeastStep = 0.25;  // of steps that overshoot
-constexpr double kLeastTracking = 0.2;  // share of the updates: below it, it is another view that was found
+constexpr double kLeastAccepted = 0.2;  // share of the updates: below it, it is another view that was found
 constexpr double kUnknown = 1e-4;       // trust in what was given, where the events shall speak alone
 constexpr double kSteps = kFilterRuns + kMostPasses;
 
-double share_of_tracking(std::span<const Update> updates) {
-  const auto good = std::ranges::count(updates, Health::tracking, &Update::health);
+double share_of_accepted(std::span<const Update> updates) {
+  const auto good = std::ranges::count(updates, true, &Update::accepted);
   return updates.empty() ? 0 : static_cast<double>(good) / static_cast<double>(updates.size());
 }
 
@@ -41,10 +41,10 @@ std::string values_words(const StaticParameters& parameters) {
                     1e3 * found.time_offset_s, " ms");
 }
 
-/// Why poses are not `tracking`, as it was said last.
+/// Why updates are not accepted, as it was said last.
 std::string reason_of(std::span<const Update> updates) {
   for (auto u = updates.rbegin(); u != updates.rend(); ++u)
-    if (u->health != Health::tracking && !u->reason.empty()) return u->reason;
+    if (!u->accepted && !u->reason.empty()) return u->reason;
   return "their health is never told";
 }
 
@@ -58,8 +58,8 @@ bool JointCalibration::go_on(const Progress& progress, double share) {
   return !(interrupted_ = !progress((done_ + share) / of));
 }
 
-double JointCalibration::tracking_share(std::size_t k) const {
-  return share_of_tracking(flights_[k]->updates());
+double JointCalibration::accepted_share(std::size_t k) const {
+  return share_of_accepted(flights_[k]->updates());
 }
 
 Eigen::MatrixXd JointCalibration::correlation() const {
@@ -82,8 +82,12 @@ Status JointCalibration::begin_parameters() {
   return {};
 }
 
-/// Whether the first flight, as the filter has it, shows another camera than the start did.
-Status JointCalibration::look_along_flight() {
+/// Whether the first flight, as the filter has it, shows another camera than the start did; one with which
+/// the filter loses the contours is none.
+Status JointCalibration::look_along_flight(const TrackRequest& request,
+                                           const std::function<bool(double)>& progress) {
+  const StaticParameters kept = *parameters_;
+  const double accepted = accepted_share(0);
   const Calibration before = parameters_->calibration();
   Calibration found = before;
   const auto other = coarse_camera_along(jobs_.front(), flights_.front()->trajectory(), &found);
@@ -96,6 +100,9 @@ Status JointCalibration::look_along_flight() {
   found.gravity_tilt_rad.setZero();
   parameters_->add(found);
   log_detail(text("along the flight: ", values_words(*parameters_)));
+  if (auto ok = flights_.front()->filter(request, progress); !ok || interrupted_) return ok;
+  constexpr double kAsGood = 0.9;
+  if (accepted_share(0) < kAsGood * accepted) *parameters_ = kept;
   return {};
 }
 
@@ -109,14 +116,14 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
       const auto told = [&](double share) { return go_on(progress, share); };
       if (auto ok = flight.filter(request, told); !ok) return ok;
       if (interrupted_) return {};
-      log_detail(text("filter: ", std::lround(100 * share_of_tracking(flight.updates())), " % tracking, ",
+      log_detail(text("filter: ", std::lround(100 * share_of_accepted(flight.updates())), " % accepted, ",
                       values_words(*parameters_)));
       ++done_;
       if (!std::ranges::any_of(flight.updates(), &Update::accepted))
         return Error{jobs_[k].recording.folder, "the events never gathered at the map's contours",
                      "check the start pose, the map and the focal length"};
       if (k == 0 && run == 0)
-        if (auto ok = look_along_flight(); !ok) return ok;
+        if (auto ok = look_along_flight(request, told); !ok || interrupted_) return ok;
     }
     flight_residuals_.emplace_back(residuals_);
     flight.on_contours([this, k](const FusionState&, std::span<const ContourOffset> contours) {
@@ -188,11 +195,11 @@ Status JointCalibration::estimate(const TrackRequest& request, const Progress& p
     log_detail(text("pass ", k + 1, ": change of ", *change, " sigma"));
   }
   for (std::size_t k = 0; k < size(); ++k)
-    if (tracking_share(k) < kLeastTracking)
+    if (accepted_share(k) < kLeastAccepted)
       return Error{
           jobs_[k].recording.folder,
-          text("with the best calibration found, ", std::lround(100 * tracking_share(k)),
-               " % of the poses are tracking (", reason_of(flights_[k]->updates()), ")"),
+          text("with the best calibration found, ", std::lround(100 * accepted_share(k)),
+               " % of the updates are accepted (", reason_of(flights_[k]->updates()), ")"),
           "give a better start pose or focal length, or a recording in which more of the map is in view"};
   return {};
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -40,12 +41,13 @@ class JointCalibration {
   /// Of the last pass: over all recordings, and of one.
   const ResidualField& residuals() const { return residuals_; }
   const ResidualField& residuals_of(std::size_t k) const { return flight_residuals_[k]; }
-  /// Share of a recording's updates whose pose was `tracking` in the last pass.
-  double tracking_share(std::size_t k) const;
+  /// Share of a recording's updates in the last pass at which the events agreed with the contours. How sure
+  /// the body's pose is does not matter here: that of the camera in the body is not known better.
+  double accepted_share(std::size_t k) const;
 
  private:
   Status begin_parameters();
-  Status look_along_flight();
+  Status look_along_flight(const TrackRequest& request, const std::function<bool(double)>& progress);
   Status begin(const TrackRequest& request, const Progress& progress);
   Expected<double> pass(const Progress& progress);
   double share_of_step(const ParameterSolution& solution);

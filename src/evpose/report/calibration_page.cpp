@@ -106,11 +106,11 @@ std::string correlation_table(const CalibrationPage& page) {
 
 std::string motion_table(const CalibrationPage& page) {
   std::string out =
-      "<table><tr><th>recording<th>s<th>tracking %<th>turn about x, y, z of the body, deg/s<th>speed "
+      "<table><tr><th>recording<th>s<th>accepted %<th>turn about x, y, z of the body, deg/s<th>speed "
       "m/s<th>acceleration m/s^2<th>image seen %</tr>";
   for (const FlightMotion& f : page.flights)
     out += formatted("<tr><td>%s<td>%.1f<td>%.0f<td>%.1f, %.1f, %.1f<td>%.2f<td>%.2f<td>%.0f</tr>",
-                     escaped_html(f.name).substr(0, 80).c_str(), f.duration_s, 100 * f.tracking,
+                     escaped_html(f.name).substr(0, 80).c_str(), f.duration_s, 100 * f.accepted,
                      f.rate_deg_s.x(), f.rate_deg_s.y(), f.rate_deg_s.z(), f.speed_m_s, f.acceleration_m_s2,
                      100 * f.coverage);
   return out + "</table>";

@@ -32,7 +32,7 @@ struct CalibrationNumber {
 struct FlightMotion {
   std::string name;
   double duration_s = 0;
-  double tracking = 0;                                   ///< share of the updates
+  double accepted = 0;                                   ///< share of the updates
   Eigen::Vector3d rate_deg_s = Eigen::Vector3d::Zero();  ///< RMS about the body's axes
   double speed_m_s = 0, acceleration_m_s2 = 0;           ///< RMS
   double coverage = 0;                                   ///< share of the image in which contours were seen

@@ -35,6 +35,7 @@ PLACES = {
     "run": (6, 290, 310, "a recording through the tracker"),
     "view": (6, 640, 265, "browser: server and pages"),
     "batch": (7, 290, 310, "all data at once: smoother"),
+    "calibrate": (8, 610, 295, "cameras from flights before a map"),
     "map_learn": (8, 290, 310, "maps made better by flights"),
     "bench": (7, 20, 240, "what the figures are made with"),
     "apps": (9, 290, 490, "the program: one file per command"),

@@ -86,10 +86,13 @@ ContourMap build_map(const fs::path& cloud_path, const fs::path& output,
 
 void bind_maps(py::module_& m) {
   using namespace py::literals;
-  py::class_<ContourMap>(m, "Map", "The prior map: points along contours, in the map's frame; arrays are copies")
-      .def(py::init(&read_map), "path"_a, "occluders"_a = "", "map.h5, contours as PLY or PCD; a PLY mesh that hides")
+  py::class_<ContourMap>(m, "Map",
+                         "The prior map: points along contours, in the map's frame; arrays are copies")
+      .def(py::init(&read_map), "path"_a, "occluders"_a = "",
+           "map.h5, contours as PLY or PCD; a PLY mesh that hides")
       .def_property_readonly(
-          "points", [](const ContourMap& c) { return rows_of(c, [&](std::size_t i) { return c.position(i); }); },
+          "points",
+          [](const ContourMap& c) { return rows_of(c, [&](std::size_t i) { return c.position(i); }); },
           "(n, 3), m")
       .def_property_readonly(
           "tangents",
@@ -129,7 +132,8 @@ void bind_maps(py::module_& m) {
       .def_readonly("source", &ContourMap::source, "file");
   m.def("build_map", &build_map, "cloud"_a, "output"_a, "settings"_a = std::map<std::string, py::object>{},
         "threads"_a = 1,
-        "Contours from a point cloud (PLY, PCD, LAS), written as map.h5. settings: keys of evpose map build --set");
+        "Contours from a point cloud (PLY, PCD, LAS), written as map.h5. settings: keys of evpose map build "
+        "--set");
 }
 
 }  // namespace evpose

@@ -38,10 +38,9 @@ Pose pose_of(const Eigen::Matrix4d& T) {
 
 class PyTracker {
  public:
-  PyTracker(const fs::path& map_path, const fs::path& calibration_path,
-            const Eigen::Matrix4d& T_map_body, TimeNs t_ns, const Eigen::Vector3d& velocity,
-            const fs::path& imu_model, const fs::path& occluders,
-            const std::map<std::string, py::object>& settings) {
+  PyTracker(const fs::path& map_path, const fs::path& calibration_path, const Eigen::Matrix4d& T_map_body,
+            TimeNs t_ns, const Eigen::Vector3d& velocity, const fs::path& imu_model,
+            const fs::path& occluders, const std::map<std::string, py::object>& settings) {
     const CalibrationFile file = value_of(read_calibration(calibration_path.string()));
     const CalibratedCamera chosen = value_of(choose_camera(file));
     size_ = chosen.intrinsics->size;
@@ -173,8 +172,7 @@ PYBIND11_MODULE(evpose, m) {
   py::class_<PyTracker>(
       m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
       .def(py::init<const fs::path&, const fs::path&, const Eigen::Matrix4d&, TimeNs, const Eigen::Vector3d&,
-                    const fs::path&, const fs::path&,
-                    const std::map<std::string, py::object>&>(),
+                    const fs::path&, const fs::path&, const std::map<std::string, py::object>&>(),
            "map"_a, "calibration"_a, "T_map_body"_a, "t_ns"_a, "velocity"_a = Eigen::Vector3d(0, 0, 0),
            "imu_model"_a = "", "occluders"_a = "", "settings"_a = std::map<std::string, py::object>{},
            "Starts at a pose. settings: keys of evpose track --dump-config, those of a poor start among them "

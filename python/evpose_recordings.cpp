@@ -27,7 +27,8 @@ Array<T> array_of(const std::vector<T>& values, std::vector<py::ssize_t> shape =
   return out;
 }
 
-using EventArrays = std::tuple<Array<std::int64_t>, Array<std::uint16_t>, Array<std::uint16_t>, Array<std::uint8_t>>;
+using EventArrays =
+    std::tuple<Array<std::int64_t>, Array<std::uint16_t>, Array<std::uint16_t>, Array<std::uint8_t>>;
 
 EventArrays events_of(Recording recording, double start_s, double duration_s) {
   std::vector<std::int64_t> t;
@@ -87,8 +88,9 @@ std::tuple<Array<std::int64_t>, Array<double>> truth_of(const Recording& recordi
 
 void bind_recordings(py::module_& m) {
   using namespace py::literals;
-  py::class_<Recording>(m, "Recording",
-                        "A recording folder, a sequence as downloaded, or a file of events; all on the IMU's clock")
+  py::class_<Recording>(
+      m, "Recording",
+      "A recording folder, a sequence as downloaded, or a file of events; all on the IMU's clock")
       .def(py::init([](const fs::path& path, const fs::path& calibration) {
              return value_of(open_recording(path.string(), calibration.string()));
            }),
@@ -107,11 +109,11 @@ void bind_recordings(py::module_& m) {
       .def_property_readonly(
           "T_cam_body", [](const Recording& r) { return r.T_cam_body.matrix(); }, "4x4")
       .def_property_readonly(
-          "map",
-          [](const Recording& r) { return r.map_path.empty() ? r.contours_path : r.map_path; },
+          "map", [](const Recording& r) { return r.map_path.empty() ? r.contours_path : r.map_path; },
           "file of its own; empty: none")
       .def("events", &events_of, "start_s"_a = 0.0, "duration_s"_a = std::numeric_limits<double>::infinity(),
-           "Arrays t (us), x, y, p (0 or 1), of a part if asked; in the order that Tracker.add_events takes them")
+           "Arrays t (us), x, y, p (0 or 1), of a part if asked; in the order that Tracker.add_events takes "
+           "them")
       .def("imu", &imu_of,
            "Arrays t (ns) and (n, 6): gyro rad/s, accel m/s^2; in the order that Tracker.add_imu takes them")
       .def("groundtruth", &truth_of, "Arrays t (ns) and T_map_body (n, 4, 4)");

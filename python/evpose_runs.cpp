@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "evpose/batch/smooth_recording.h"
+#include "evpose/calibrate/calibrate_recordings.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/report/csv_table.h"
 #include "evpose/report/run_files.h"
@@ -78,7 +79,8 @@ TrackRequest request_of(const fs::path& recording, const fs::path& map, const fs
   request.occluders = occluders.string();
   request.init = init;
   request.init_sigma = {init_sigma.first, init_sigma.second};
-  for (const auto& [key, setting] : settings) request.assignments.push_back(key + "=" + setting_text(setting));
+  for (const auto& [key, setting] : settings)
+    request.assignments.push_back(key + "=" + setting_text(setting));
   return request;
 }
 
@@ -96,9 +98,9 @@ auto worked(TrackRequest request, auto&& work) {
   return value_of(std::move(outcome));
 }
 
-RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
-               const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
-               const Settings& settings, bool replace) {
+RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map,
+               const fs::path& calibration, const fs::path& occluders, const std::string& init,
+               const std::pair<double, double>& init_sigma, const Settings& settings, bool replace) {
   TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
   request.output = output.string();
   request.replace = replace;
@@ -106,9 +108,9 @@ RunFiles track(const fs::path& recording, const fs::path& output, const fs::path
   return value_of(read_run_files(output.string()));
 }
 
-RunFiles smooth(const fs::path& recording, const fs::path& output, const fs::path& map, const fs::path& calibration,
-                const fs::path& occluders, const std::string& init, const std::pair<double, double>& init_sigma,
-                const Settings& settings, bool replace) {
+RunFiles smooth(const fs::path& recording, const fs::path& output, const fs::path& map,
+                const fs::path& calibration, const fs::path& occluders, const std::string& init,
+                const std::pair<double, double>& init_sigma, const Settings& settings, bool replace) {
   TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
   request.output = output.string();
   request.replace = replace;
@@ -142,12 +144,28 @@ Expected<Update> find_pose(const TrackRequest& request, double within_s) {
   return *last;
 }
 
-Update relocalise(const fs::path& recording, const std::string& init, const std::pair<double, double>& init_sigma,
-                  const fs::path& map, const fs::path& calibration, const fs::path& occluders, double within_s,
+Update relocalise(const fs::path& recording, const std::string& init,
+                  const std::pair<double, double>& init_sigma, const fs::path& map,
+                  const fs::path& calibration, const fs::path& occluders, double within_s,
                   const Settings& settings) {
   if (!(within_s > 0 && within_s < 1e6)) throw py::value_error("within_s: give seconds, more than 0");
   return worked(request_of(recording, map, calibration, occluders, init, init_sigma, settings),
                 [&](const TrackRequest& request) { return find_pose(request, within_s); });
+}
+
+CalibrateOutcome calibrate(const std::vector<fs::path>& recordings, const fs::path& output,
+                           const fs::path& map, const fs::path& calibration, const fs::path& occluders,
+                           const std::string& init, const std::pair<double, double>& init_sigma,
+                           const Settings& settings, bool replace) {
+  TrackRequest request = request_of({}, map, calibration, occluders, init, init_sigma, settings);
+  request.output = output.string();
+  request.replace = replace;
+  const auto outcome = worked(request, [&](const TrackRequest& track) {
+    CalibrateRequest asked{{}, track};
+    for (const fs::path& recording : recordings) asked.recordings.push_back(recording.string());
+    return calibrate_recordings(asked);
+  });
+  return outcome.value();  // it would be none after an interruption
 }
 
 }  // namespace
@@ -155,12 +173,14 @@ Update relocalise(const fs::path& recording, const std::string& init, const std:
 void bind_runs(py::module_& m) {
   using namespace py::literals;
   py::class_<RunFiles>(m, "Run", "A run folder of evpose track: a row for each update; arrays are copies")
-      .def(py::init([](const fs::path& folder) { return value_of(read_run_files(folder.string())); }), "folder"_a,
-           "ValueError says what is wrong")
+      .def(py::init([](const fs::path& folder) { return value_of(read_run_files(folder.string())); }),
+           "folder"_a, "ValueError says what is wrong")
       .def_readonly("folder", &RunFiles::folder, "where it stands")
       .def_property_readonly(
           "t_ns",
-          [](const RunFiles& r) { return column_of<std::int64_t>(r, [](const RunRow& row) { return row.t; }); },
+          [](const RunFiles& r) {
+            return column_of<std::int64_t>(r, [](const RunRow& row) { return row.t; });
+          },
           "(n,), data time")
       .def_property_readonly(
           "T_map_body",
@@ -170,7 +190,9 @@ void bind_runs(py::module_& m) {
           "(n, 4, 4)")
       .def_property_readonly(
           "covariance",
-          [](const RunFiles& r) { return matrices_of(r, 6, [](const RunRow& row) { return row.covariance; }); },
+          [](const RunFiles& r) {
+            return matrices_of(r, 6, [](const RunRow& row) { return row.covariance; });
+          },
           "(n, 6, 6) of (translation in the map, rotation in the body), m^2, rad^2")
       .def_property_readonly(
           "valid",
@@ -190,13 +212,41 @@ void bind_runs(py::module_& m) {
   const auto known = std::pair<double, double>(0, 0);
   m.def("track", &track, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
         "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
-        "What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched first");
+        "What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched "
+        "first");
   m.def("smooth", &smooth, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
         "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
         "What evpose smooth does: the trajectory from all data, past and future");
-  m.def("relocalise", &relocalise, "recording"_a, "init"_a, "init_sigma"_a, "map"_a = "", "calibration"_a = "",
-        "occluders"_a = "", "within_s"_a = 1.0, "settings"_a = Settings{},
-        "The pose near a rough one (x,y,z,qx,qy,qz,qw[@t_s]; init_sigma: m and deg per axis) that the events confirm: "
+  py::class_<CalibrationNumber>(m, "CalibrationNumber",
+                                "One number of a calibration, with 1-sigma uncertainties")
+      .def_readonly("name", &CalibrationNumber::name, "fx, cy, k1, turn x, place z, time, ...")
+      .def_readonly("unit", &CalibrationNumber::unit, "px, deg, mm, ms, or empty")
+      .def_readonly("given", &CalibrationNumber::given, "where it began")
+      .def_readonly("given_sigma", &CalibrationNumber::given_sigma, "how far that was believed")
+      .def_readonly("found", &CalibrationNumber::found, "what was found")
+      .def_readonly("sigma", &CalibrationNumber::sigma, "and how well it is known");
+  py::class_<CalibrateOutcome>(m, "Calibration", "What calibrate() has found")
+      .def_property_readonly(
+          "numbers", [](const CalibrateOutcome& o) { return o.page.numbers; },
+          "those of the file, in the file's order")
+      .def_property_readonly(
+          "correlation", [](const CalibrateOutcome& o) { return o.page.correlation; },
+          "(n, n), of the numbers")
+      .def_property_readonly(
+          "notes", [](const CalibrateOutcome& o) { return o.page.words; },
+          "what the motion told and what it did not")
+      .def_readonly("converged", &CalibrateOutcome::converged, "the passes have come to rest")
+      .def_readonly("report", &CalibrateOutcome::report, "its file");
+  m.def("calibrate", &calibrate, "recordings"_a, "output"_a, "map"_a = "", "calibration"_a = "",
+        "occluders"_a = "", "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{},
+        "replace"_a = false,
+        "What evpose calibrate does: camera, its pose in the body and its clock from recordings before a "
+        "known map, "
+        "written as Kalibr's camera chain");
+  m.def("relocalise", &relocalise, "recording"_a, "init"_a, "init_sigma"_a, "map"_a = "",
+        "calibration"_a = "", "occluders"_a = "", "within_s"_a = 1.0, "settings"_a = Settings{},
+        "The pose near a rough one (x,y,z,qx,qy,qz,qw[@t_s]; init_sigma: m and deg per axis) that the events "
+        "confirm: "
         "the first update whose health is tracking; without one, the last after within_s seconds of data");
 }
 

@@ -3,6 +3,7 @@
 """The Python module: module_test.py FOLDER_OF_MODULE SOURCE"""
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -13,7 +14,7 @@ import numpy as np
 MODULE, SOURCE = pathlib.Path(sys.argv.pop(1)), pathlib.Path(sys.argv.pop(1))
 sys.path[:0] = [str(MODULE), str(SOURCE / "tests/end_to_end")]
 import evpose  # noqa: E402
-from recording import Recording, position  # noqa: E402
+from recording import CALIBRATION, Recording, position  # noqa: E402
 
 
 class ModuleTest(unittest.TestCase):
@@ -167,6 +168,20 @@ class ModuleTest(unittest.TestCase):
             off = np.linalg.norm(run.T_map_body[:, :3, 3] - position(run.t_ns * 1e-9), axis=1)
             errors[name] = np.mean(off[run.valid])
         self.assertLess(errors["smooth"], errors["track"] + 1e-4)
+
+    def test_a_camera_is_calibrated(self):
+        file = self.folder / "found.yaml"
+        given = re.sub(r"intrinsics: \[([0-9.]+)", lambda m: f"intrinsics: [{1.002 * float(m[1]):.3f}", CALIBRATION)
+        (self.folder / "start.yaml").write_text(given)
+        found = evpose.calibrate([self.folder], file, calibration=self.folder / "start.yaml")
+        numbers = {n.name: n for n in found.numbers}
+        self.assertEqual(found.correlation.shape, (len(numbers), len(numbers)))
+        self.assertLess(numbers["fx"].sigma, numbers["fx"].given_sigma)
+        self.assertIn("time", " ".join(found.notes), "so short a slide does not tell it")
+        self.assertIn("calibration_correlation", file.read_text())
+        self.assertGreater(pathlib.Path(found.report).stat().st_size, 5000)
+        with self.assertRaisesRegex(ValueError, "exists"):
+            evpose.calibrate([self.folder], file)
 
     def test_the_notebook_runs(self):
         try:

@@ -15,6 +15,7 @@
 #include "evpose/io/recording/dataset_layouts.h"
 #include "evpose/io/recording/event_survey.h"
 #include "evpose/io/recording/imu_survey.h"
+#include "evpose/io/recording/turn_of_events.h"
 #include "evpose/run/progress.h"
 #include "info_parts.h"
 #include "sheet.h"
@@ -221,11 +222,13 @@ void check_imu(Checklist& list, const CheckedRecording& data) {
   if (auto doubt = doubt_imu_scales(data.imu, r.imu_path)) doubts.push_back(*doubt);
   if (auto doubt = doubt_gyro_by_gravity(data.imu, r.imu_path); doubt && doubts.empty())
     doubts.push_back(*doubt);
+  if (const auto doubt = doubt_gyro_by_events(r, data.imu); doubt && *doubt && doubts.empty())
+    doubts.push_back(**doubt);
   for (const Error& doubt : doubts) list.problem("IMU", doubt);
   if (doubts.empty())
-    list.ok("IMU",
-            text("mean |a| ", fixed(s.mean_accel_norm, 2), " m/s^2; ",
-                 data.truth.empty() ? "gravity" : "the ground truth", " does not contradict its axes"));
+    list.ok("IMU", text("mean |a| ", fixed(s.mean_accel_norm, 2), " m/s^2; ",
+                        data.truth.empty() ? "gravity" : "the ground truth",
+                        " and the turn of the events do not contradict its axes"));
 }
 
 void check_calibration(Checklist& list, const CheckedRecording& data) {

@@ -20,6 +20,7 @@ struct RunOutcome;
 void add_demo(CLI::App& app, std::function<int()>& run);
 void add_simulate(CLI::App& app, std::function<int()>& run);
 void add_track(CLI::App& app, std::function<int()>& run);
+void add_calibrate(CLI::App& app, std::function<int()>& run);
 void add_smooth(CLI::App& app, std::function<int()>& run);
 void add_check(CLI::App& app, std::function<int()>& run);
 void add_eval(CLI::App& app, std::function<int()>& run);

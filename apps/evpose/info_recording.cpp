@@ -4,6 +4,7 @@
 #include "evpose/io/motion/imu_axes.h"
 #include "evpose/io/motion/trajectory.h"
 #include "evpose/io/recording/dataset_layouts.h"
+#include "evpose/io/recording/turn_of_events.h"
 #include "info_parts.h"
 
 namespace evpose {
@@ -119,6 +120,8 @@ void describe_opened(Sheet& sheet, const FoundRecording& found, const Recording&
                               doubt_camera_roll(samples, r.T_cam_body.q.toRotationMatrix(), r.imu_path)})
       if (doubt) sheet.find(*doubt);
   }
+  if (events && r.has_imu)
+    if (const auto doubt = doubt_gyro_by_events(r, samples); doubt && *doubt) sheet.find(**doubt);
   if (found.camera) {
     describe_camera(sheet, *found.camera, "camera " + found.camera->name);
   } else if (auto status = describe_calibration(sheet, r.calibration_path); !status) {

@@ -28,6 +28,7 @@ int run_program(int argc, char** argv) {
   add_simulate(app, run);
   add_track(app, run);
   add_smooth(app, run);
+  add_calibrate(app, run);
   add_check(app, run);
   add_eval(app, run);
   add_map(app, run);

@@ -8,10 +8,10 @@
 
 namespace evpose {
 
-void add_run_options(CLI::App& command, TrackRequest& request) {
+void add_input_options(CLI::App& command, TrackRequest& request, const std::string& calibration) {
   command.add_option("--map", request.map, "contours (PLY, PCD, map.h5); default: the recording's own");
   command.add_option(
-      "--calibration", request.calibration,
+      calibration, request.calibration,
       "calibration of any kind that evpose info knows; default: the one found with the recording");
   command.add_option("--occluders", request.occluders,
                      "PLY mesh that hides contours behind it; default: the map's own");
@@ -28,6 +28,10 @@ void add_run_options(CLI::App& command, TrackRequest& request) {
                      "settings to begin with: paper, the method of EV-Pose in place of the defaults");
   command.add_option("--config", request.config_file, "YAML file with settings");
   command.add_option("--set", request.assignments, "one setting, key=value")->allow_extra_args(false);
+}
+
+void add_run_options(CLI::App& command, TrackRequest& request) {
+  add_input_options(command, request, "--calibration");
   request.output = "run";
   command.add_option("-o,--output", request.output, "run folder")->capture_default_str();
   command.add_flag("--force", request.replace, "replace an earlier run in the run folder");

@@ -187,6 +187,47 @@ class Run:
     def table(self, file: str = 'states.csv') -> dict[str, NDArray[np.float64]]:
         """Columns of numbers of states.csv, states_imu.csv, calibration.csv or latency.csv, by name"""
 
+class CalibrationNumber:
+    """One number of a calibration, with 1-sigma uncertainties"""
+
+    @property
+    def name(self) -> str:
+        """fx, cy, k1, turn x, place z, time, ..."""
+    @property
+    def unit(self) -> str:
+        """px, deg, mm, ms, or empty"""
+    @property
+    def given(self) -> float:
+        """where it began"""
+    @property
+    def given_sigma(self) -> float:
+        """how far that was believed"""
+    @property
+    def found(self) -> float:
+        """what was found"""
+    @property
+    def sigma(self) -> float:
+        """and how well it is known"""
+
+class Calibration:
+    """What calibrate() has found"""
+
+    @property
+    def numbers(self) -> list[CalibrationNumber]:
+        """those of the file, in the file's order"""
+    @property
+    def correlation(self) -> NDArray[np.float64]:
+        """(n, n), of the numbers"""
+    @property
+    def notes(self) -> list[str]:
+        """what the motion told and what it did not"""
+    @property
+    def converged(self) -> bool:
+        """the passes have come to rest"""
+    @property
+    def report(self) -> str:
+        """its file"""
+
 def build_map(
     cloud: str | PathLike[str],
     output: str | PathLike[str],
@@ -220,6 +261,19 @@ def smooth(
     replace: bool = False,
 ) -> Run:
     """What evpose smooth does: the trajectory from all data, past and future"""
+
+def calibrate(
+    recordings: list[str | PathLike[str]],
+    output: str | PathLike[str],
+    map: str | PathLike[str] = '',
+    calibration: str | PathLike[str] = '',
+    occluders: str | PathLike[str] = '',
+    init: str = 'auto',
+    init_sigma: tuple[float, float] = ...,
+    settings: dict[str, Any] = {},
+    replace: bool = False,
+) -> Calibration:
+    """What evpose calibrate does: camera, its pose in the body and its clock from recordings before a known map, written as Kalibr's camera chain"""
 
 def relocalise(
     recording: str | PathLike[str],

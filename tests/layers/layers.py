@@ -17,13 +17,15 @@ MAP = SENSORS | {"map"}
 SOLVERS = MAP | {"registration", "fusion"}
 TRACKER = SOLVERS | {"tracker"}
 IO = MAP | {"io"}
-ALL = TRACKER | IO | {"map_build", "sim", "eval", "report", "run", "batch", "map_learn", "mavlink", "serve", "view", "bench"}
+ALL = TRACKER | IO | {"map_build", "sim", "eval", "report", "run", "batch", "calibrate", "map_learn", "mavlink", "serve",
+                      "view", "bench"}
 MAY_SEE = {
     "core": set(), "camera": CORE, "imu": CORE, "event": CORE, "map": SENSORS,
     "registration": MAP, "fusion": MAP, "tracker": SOLVERS,
     "io": MAP, "map_build": IO, "sim": IO, "eval": IO,
     "mavlink": TRACKER, "serve": TRACKER | IO | {"mavlink"}, "view": TRACKER | IO | {"report"},
     "run": TRACKER | IO | {"report"}, "batch": TRACKER | IO | {"report", "run"},
+    "calibrate": TRACKER | IO | {"report", "run", "batch"},
     "map_learn": TRACKER | IO | {"report", "run", "batch"}, "report": ALL, "bench": ALL, "apps": ALL,
 }
 EMBEDDABLE = TRACKER

@@ -33,6 +33,28 @@ bool estimates_time_offset(const TrackJob& job) {
          job.config.tracker.fusion.calibration.on;
 }
 
+/// What a filter has found, for another one to begin with: it may be surer than it is right.
+Calibration widened(Calibration found) {
+  constexpr double kTimes = 3;
+  found.intrinsics_sigma *= kTimes;
+  found.turn_sigma_rad *= kTimes;
+  found.shift_sigma_m *= kTimes;
+  return found;
+}
+
+/// A filter does not look for the time offset.
+CalibrationSigma sigma_of(const Calibration& known) {
+  CalibrationSigma out;
+  if (const Eigen::VectorXd& numbers = known.intrinsics_sigma; numbers.size() > 0) {
+    out.intrinsics.emplace(numbers.begin(), numbers.begin() + 4);
+    out.distortion.emplace(numbers.begin() + 4, numbers.end());
+  }
+  out.rotation_rad = known.turn_sigma_rad;
+  out.translation_m = known.shift_sigma_m;
+  out.time_s = 0;
+  return out;
+}
+
 Status check_view(const TrackJob& job, const std::vector<Update>& updates) {
   if (updates.empty())
     return Error{job.recording.folder, "the streams end before the first update",
@@ -46,28 +68,31 @@ Status check_view(const TrackJob& job, const std::vector<Update>& updates) {
 }  // namespace
 
 Status BatchEstimator::filter(const TrackRequest& request, const Progress& progress) {
-  TrackerSetup setup = job_.setup;
+  const TrackJob job = parameters_ ? at_present_values() : job_;
+  TrackerSetup setup = job.setup;
+  if (parameters_) setup.calibration_sigma = sigma_of(parameters_->calibration());
   if (setup.calibration_sigma) setup.calibration_sigma->time_s = 0;
   FusionConfig resolved;
   const auto make = [&](const FusionConfig& config) {
     resolved = config;
     return make_back_end(setup.motion, config, setup.imu_noise, setup.T_body_cam);
   };
-  auto tracker = Tracker::create(setup, job_.config.tracker, job_.start, {}, make);
+  auto tracker = Tracker::create(setup, job.config.tracker, job.start, {}, make);
   if (!tracker) return tracker.error();
   resolved.calibration.time_offset = estimates_time_offset(job_);
   if (resolved.calibration.time_offset)
     resolved.calibration.start_time_sigma_s = job_.setup.calibration_sigma->of_time_s();
-  parameters_.emplace(resolved);
+  if (!parameters_) parameters_ = std::make_shared<StaticParameters>(resolved);
   trajectory_ = {(*tracker)->state()};
+  updates_.clear();
   (*tracker)->on_update([&](const Update& u) {
     trajectory_.push_back((*tracker)->state());
     updates_.push_back(u);
   });
   const auto go_on = [&](double share) { return !(interrupted_ = !progress(share)); };
-  if (auto ok = feed_recording(job_.recording, job_.config, **tracker, go_on); !ok) return ok;
+  if (auto ok = feed_recording(job.recording, job.config, **tracker, go_on); !ok) return ok;
   if (interrupted_) return {};
-  parameters_->add((*tracker)->calibration());
+  parameters_->add(widened((*tracker)->calibration()));
   summary_ = summarise(job_, request, **tracker, (*tracker)->calibration());
   return check_view(job_, updates_);
 }
@@ -98,12 +123,16 @@ TrackJob BatchEstimator::at_present_values() const {
 /// Measures along the trajectory; the tracker that has done it.
 Expected<std::unique_ptr<Tracker>> BatchEstimator::follow(const Progress& progress) {
   const TrackJob job = at_present_values();
+  followed_ = job.setup;
   TrackerConfig config = job.config.tracker;
   config.relocalization.on = false;
   config.event_registration.correlation_time_s *= kLongerCorrelation;
   const auto make = [&](const FusionConfig& fusion) {
-    return std::make_unique<FollowingBackEnd>(StatePropagator(job.setup.motion, fusion, job.setup.imu_noise),
-                                              trajectory_, job.setup.T_body_cam, *parameters_, chain_);
+    auto back_end =
+        std::make_unique<FollowingBackEnd>(StatePropagator(job.setup.motion, fusion, job.setup.imu_noise),
+                                           trajectory_, job.setup.T_body_cam, *parameters_, chain_);
+    back_end->on_contours(contour_callback_);
+    return back_end;
   };
   auto tracker = Tracker::create(job.setup, config, job.start, {}, make);
   if (!tracker) return tracker.error();
@@ -114,32 +143,28 @@ Expected<std::unique_ptr<Tracker>> BatchEstimator::follow(const Progress& progre
   return tracker;
 }
 
-/// Takes what the last pass has gathered.
-double BatchEstimator::correct() {
-  ParameterInformation known = parameters_->prior();
-  known.add(chain_.parameters());
-  const Eigen::Index n = known.s.size();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(known.S);
-  const Eigen::VectorXd z = ldlt.solve(known.s);
-  const Eigen::MatrixXd covariance = ldlt.solve(Eigen::MatrixXd::Identity(n, n));
-  const auto smoothed = chain_.smooth(z, covariance);
+double BatchEstimator::take(const ParameterSolution& found, double share) {
+  const auto smoothed = chain_.smooth(found.z, found.covariance);
   trajectory_.resize(smoothed.size());  // another time offset may have cost the last update
   for (std::size_t k = 0; k < smoothed.size(); ++k) {
-    trajectory_[k].add(smoothed[k].mean);
+    trajectory_[k].add(share * smoothed[k].mean);
     trajectory_[k].covariance = smoothed[k].covariance;
   }
-  double change = pose_change(smoothed);
-  for (int i = 0; i < parameters_->calibration_size(); ++i)
-    change = std::max(change, std::abs(z(i)) / std::sqrt(covariance(i, i)));
-  parameters_->correct(z, covariance);
-  return change;
+  return pose_change(smoothed);
+}
+
+Expected<ParameterInformation> BatchEstimator::measure(const Progress& progress) {
+  if (const auto tracker = follow(progress); !tracker) return tracker.error();
+  return chain_.parameters();
 }
 
 Expected<double> BatchEstimator::iterate(const TrackRequest& request, const Progress& progress) {
   const auto tracker = follow(progress);
   if (!tracker) return tracker.error();
   if (interrupted_) return 0;
-  const double change = correct();
+  const ParameterSolution found = parameters_->solve(chain_.parameters());
+  const double change = std::max(take(found), parameters_->change(found));
+  parameters_->correct(found);
   summary_ = summarise(job_, request, **tracker, parameters_->calibration());
   return change;
 }

@@ -6,6 +6,7 @@
 
 #include "evpose/core/error.h"
 #include "evpose/fusion/calibration_states.h"
+#include "evpose/fusion/shared_errors.h"
 
 namespace evpose {
 namespace {
@@ -14,6 +15,9 @@ using namespace error_state;
 
 /// Of biases that are found anew: any IMU.
 constexpr double kAnyGyroBias_rad_s = 1, kAnyAccelBias_m_s2 = 3;
+
+/// To each side of a state, for its turn rate.
+constexpr TimeNs kSlow = 25 * kNsPerMs, kQuick = 3 * kNsPerMs;
 
 }  // namespace
 
@@ -25,6 +29,7 @@ FollowingBackEnd::FollowingBackEnd(const StatePropagator& propagator, std::span<
       parameters_(parameters),
       chain_(chain) {
   EVPOSE_CHECK(!trajectory.empty());
+  if (parameters_.places().time) quick_share_ = quick_share();
 }
 
 void FollowingBackEnd::start(const FusionState& first) {
@@ -93,7 +98,7 @@ void FollowingBackEnd::arrive() {
 /// What single contours say of parameters beside the pose.
 void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
   const Eigen::Matrix3d R = state_.nav.T_map_body.rotation();
-  std::array<BlockRow, 2> rows;
+  std::array<BlockRow, 4> rows;
   for (const ContourOffset& contour : contours) {
     std::size_t n = 0;
     const auto add = [&](int block, int place, const BlockRow::Derivative& derivative) {
@@ -111,6 +116,9 @@ void FollowingBackEnd::add_contours(std::span<const ContourOffset> contours) {
     if (const auto place = parameters_.places().intrinsics;
         place && contour.by_intrinsics.size() == parameters_.intrinsics_count())
       add(0, *place, contour.by_intrinsics);
+    for (const auto& [number, px] : SharedErrors::on(contour))
+      if (const auto place = parameters_.shared_error(number))
+        add(1 + *place, *place, BlockRow::Derivative::Constant(1, px));
     if (n > 0) measurement_.add({contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}});
   }
 }
@@ -119,17 +127,41 @@ Eigen::Vector3d FollowingBackEnd::displacement_of(std::uint32_t segment) const {
   return parameters_.displacement_of(segment);
 }
 
-/// What an error of the time offset does to the seen pose. The rate is that of the trajectory over a while:
-/// the gyroscope's noise is that of the predictions as well, and a derivative that knew it would pull the
-/// offset to one side.
+/// Of the trajectory about its state k, body frame, rad/s.
+Eigen::Vector3d FollowingBackEnd::rate_over(std::size_t k, TimeNs to_each_side, double* dt_s) const {
+  std::size_t before = k, after = k;
+  const TimeNs t = trajectory_[k].t;
+  while (before > 0 && t - trajectory_[before].t < to_each_side) --before;
+  while (after + 1 < trajectory_.size() && trajectory_[after].t - t < to_each_side) ++after;
+  const FusionState &a = trajectory_[before], &b = trajectory_[after];
+  *dt_s = to_seconds(b.t - a.t);
+  if (!(*dt_s > 0)) return Eigen::Vector3d::Zero();
+  return so3::log(a.nav.T_map_body.q.conjugate() * b.nav.T_map_body.q) / *dt_s;
+}
+
+/// Share of the quick part of the turn rate that is motion and not the gyroscope's noise.
+double FollowingBackEnd::quick_share() const {
+  double square = 0, noise = 0;
+  const double density = propagator().noise().gyro_density;
+  for (std::size_t k = 0; k < trajectory_.size(); ++k) {
+    double slow_s = 0, quick_s = 0;
+    const Eigen::Vector3d slow = rate_over(k, kSlow, &slow_s), quick = rate_over(k, kQuick, &quick_s);
+    if (!(quick_s > 0) || !(slow_s > quick_s)) continue;
+    square += (quick - slow).squaredNorm();
+    noise += 3 * density * density * (1 / quick_s - 1 / slow_s);
+  }
+  return square > noise ? 1 - noise / square : 0;
+}
+
+/// What an error of the time offset does to the seen pose. The gyroscope's noise is in the trajectory and in
+/// the predictions, and a rate that knew it would pull the offset to one side; a rate over a while does not
+/// know a vibration. So of what is quick as much is taken as is motion (Wiener).
 Vector6d FollowingBackEnd::seen_pose_by_time() const {
-  constexpr TimeNs kToEachSide = 25 * kNsPerMs;
-  auto before = trajectory_.begin() + static_cast<std::ptrdiff_t>(next_ - 1), after = before;
-  while (before != trajectory_.begin() && state_.t - before->t < kToEachSide) --before;
-  while (after + 1 != trajectory_.end() && after->t - state_.t < kToEachSide) ++after;
   FusionState state = state_;
-  if (const double dt_s = to_seconds(after->t - before->t); dt_s > 0)
-    state.angular_rate = so3::log(before->nav.T_map_body.q.conjugate() * after->nav.T_map_body.q) / dt_s;
+  double dt_s = 0;
+  const Eigen::Vector3d slow = rate_over(next_ - 1, kSlow, &dt_s),
+                        quick = rate_over(next_ - 1, kQuick, &dt_s);
+  if (dt_s > 0) state.angular_rate = slow + quick_share_ * (quick - slow);
   return seen_pose_by_time_offset(state);
 }
 
@@ -172,7 +204,8 @@ ChainMeasurement FollowingBackEnd::by_parameters() const {
 void FollowingBackEnd::update(const PoseInformation& measurement, std::span<const ContourOffset> contours) {
   if (state_.t != trajectory_[next_ - 1].t) return;  // after the trajectory's end
   measurement_.start(measurement);
-  if (takes_contours()) add_contours(contours);
+  add_contours(contours);
+  if (contour_callback_) contour_callback_(state_, contours);
   chain_.measure(by_parameters());
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "evpose/batch/chain_smoother.h"
@@ -11,6 +13,9 @@
 
 namespace evpose {
 
+/// Told of the contours that a state of the trajectory was measured with.
+using ContourCallback = std::function<void(const FusionState&, std::span<const ContourOffset>)>;
+
 /// In place of a fusion: the tracker measures along a known trajectory, and what IMU and contours say about
 /// its errors goes to a smoother (one step of Gauss-Newton over the whole recording).
 class FollowingBackEnd final : public BackEnd {
@@ -19,6 +24,8 @@ class FollowingBackEnd final : public BackEnd {
   /// propagator's gravity: at the parameters' present values. References are kept.
   FollowingBackEnd(const StatePropagator& propagator, std::span<const FusionState> trajectory,
                    const Pose& T_body_cam, StaticParameters& parameters, ChainSmoother& chain);
+
+  void on_contours(ContourCallback callback) { contour_callback_ = std::move(callback); }
 
   using BackEnd::start;
   using BackEnd::update;
@@ -39,6 +46,8 @@ class FollowingBackEnd final : public BackEnd {
   void add_step(const Matrix15d& transition, double dt_s);
   void arrive();
   void add_contours(std::span<const ContourOffset> contours);
+  Eigen::Vector3d rate_over(std::size_t k, TimeNs to_each_side, double* dt_s) const;
+  double quick_share() const;
   Vector6d seen_pose_by_time() const;
   ChainMeasurement by_parameters() const;
 
@@ -53,6 +62,8 @@ class FollowingBackEnd final : public BackEnd {
   Matrix15d transition_ = Matrix15d::Identity();
   Eigen::Matrix<double, 15, 2> by_tilt_ = Eigen::Matrix<double, 15, 2>::Zero();
   JointMeasurement measurement_;
+  ContourCallback contour_callback_;
+  double quick_share_ = 0;
   std::vector<int> places_;  ///< first parameter of each block of the measurement, by its id
 };
 

@@ -9,6 +9,7 @@
 
 #include "evpose/camera/adjusted_camera.h"
 #include "evpose/camera/calibration_sigma.h"
+#include "evpose/fusion/shared_errors.h"
 #include "evpose/tracker/test_flight.h"
 
 namespace evpose {
@@ -37,7 +38,8 @@ FusionConfig settings() {
 
 class Flight {
  public:
-  Flight(unsigned seed, double duration_s) : random_(seed), duration_s_(duration_s), parameters_(settings()) {
+  Flight(unsigned seed, double duration_s)
+      : random_(seed), duration_s_(duration_s), parameters_(settings(), StaticParameters::Shared::estimated) {
     noise_.gyro_density = 2e-3, noise_.accel_density = 2e-2, noise_.gyro_walk = noise_.accel_walk = 1e-5;
     const FusionConfig config = settings();
     const CalibrationConfig& c = config.calibration;
@@ -54,6 +56,7 @@ class Flight {
     Vector15d off;
     for (int i = 0; i < 15; ++i) off(i) = i < 9 ? std::sqrt(start_.covariance(i, i)) * normal_(random_) : 0;
     start_.add(off);
+    for (int i = 1; i < SharedErrors::kCount; ++i) shared_errors_(i) = normal_(random_);
     make_imu();
     make_contours();
     for (int k = 0; k * kUpdateStep_s < duration_s; ++k)
@@ -77,16 +80,15 @@ class Flight {
       measure(follow, *camera, T_body_cam, pixels);
       ++next;
     }
-    ParameterInformation known = parameters_.prior();
-    known.add(chain.parameters());
-    covariance_ = known.S.inverse();
-    const Eigen::VectorXd z = covariance_ * known.s;
-    const auto smoothed = chain.smooth(z, covariance_);
+    const ParameterSolution found = parameters_.solve(chain.parameters());
+    covariance_ = found.covariance.topLeftCorner(kCalibration, kCalibration);
+    const Eigen::VectorXd z = found.z.head(kCalibration);
+    const auto smoothed = chain.smooth(found.z, found.covariance);
     for (std::size_t k = 0; k < smoothed.size(); ++k) {
       trajectory_[k].add(smoothed[k].mean);
       trajectory_[k].covariance = smoothed[k].covariance;
     }
-    parameters_.correct(z, covariance_);
+    parameters_.correct(found);
     return z.cwiseQuotient(covariance_.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff();
   }
 
@@ -145,6 +147,12 @@ class Flight {
     state.covariance.setIdentity();
     return state;
   }
+  /// What the flight's shared errors do to this contour.
+  double shared_offset_px(const ContourOffset& contour) const {
+    double out = 0;
+    for (const auto& [number, px] : SharedErrors::on(contour)) out += px * shared_errors_(number);
+    return out;
+  }
   void measure(FollowingBackEnd& follow, const AdjustedCamera& camera, const Pose& T_body_cam,
                PixelNoise& pixels) {
     const FusionState& state = follow.state();
@@ -167,7 +175,8 @@ class Flight {
       const Eigen::Vector2d line = J * (T_body_cam.q.conjugate() * (at.q.conjugate() * along));
       const Eigen::Vector2d n = Eigen::Vector2d(-line.y(), line.x()).normalized();
       ContourOffset o{x_body, T_body_cam.q * Eigen::Vector3d(J.transpose() * n), 0, kWeight_px2};
-      o.offset_px = -n.dot(*seen - *pixel) + noise_px;
+      o.normal_px = n;
+      o.offset_px = -n.dot(*seen - *pixel) + noise_px + shared_offset_px(o);
       o.by_intrinsics = -n.transpose() * *by_numbers;
       const Vector6d by_pose = o.by_pose(at.rotation());
       sum.information += o.weight * by_pose * by_pose.transpose();
@@ -184,6 +193,7 @@ class Flight {
   ImuNoise noise_;
   const Pose given_ = test_flight::camera_on_body();
   Eigen::VectorXd errors_;  ///< of what was given, in the order of the parameters
+  Eigen::VectorXd shared_errors_ = Eigen::VectorXd::Zero(SharedErrors::kCount);  ///< in sigmas
   Eigen::Vector3d gyro_bias_, accel_bias_;
   FusionState start_;
   std::vector<ImuSample> imu_;

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/batch/static_parameters.h"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace evpose {
 
-StaticParameters::StaticParameters(const FusionConfig& config) {
+StaticParameters::StaticParameters(const FusionConfig& config, Shared shared) : shared_(shared) {
   const CalibrationConfig& c = config.calibration;
   std::vector<double> sigmas;
   const auto add = [&](bool asked, std::optional<int>* place, const Eigen::VectorXd& sigma) {
@@ -19,14 +22,33 @@ StaticParameters::StaticParameters(const FusionConfig& config) {
   add(c.gravity, &places_.gravity, Eigen::VectorXd::Constant(2, c.start_gravity_sigma_rad));
   add(c.intrinsics, &places_.intrinsics, c.start_intrinsics_sigma);
   intrinsics_count_ = c.intrinsics ? c.start_intrinsics_sigma.size() : 0;
+  state_prior(c, sigmas);
+  found_.intrinsics.setZero(intrinsics_count_);
+  calibration_size_ = places_.shared = static_cast<int>(sigmas.size());
+  size_ = calibration_size_ + SharedErrors::kCount;
+  if (config.segment_offsets == SegmentOffsetUse::on) segments_config_ = config.segments;
+}
+
+void StaticParameters::state_prior(const CalibrationConfig& config, const std::vector<double>& sigmas) {
+  const auto n = static_cast<Eigen::Index>(sigmas.size());
   // A number that is known has the sigma zero.
   constexpr double kKnown = 1e-9;
-  calibration_sigma_ =
-      Eigen::Map<const Eigen::VectorXd>(sigmas.data(), static_cast<Eigen::Index>(sigmas.size()))
-          .cwiseMax(kKnown);
-  found_.intrinsics.setZero(intrinsics_count_);
-  calibration_size_ = size_ = static_cast<int>(sigmas.size());
-  if (config.segment_offsets == SegmentOffsetUse::on) segments_config_ = config.segments;
+  given_sigma_ = Eigen::Map<const Eigen::VectorXd>(sigmas.data(), n).cwiseMax(kKnown);
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(n, n);
+  using Kind = CalibrationConfig::Kind;
+  const std::pair<Kind, std::optional<int>> kinds[] = {{Kind::intrinsics, places_.intrinsics},
+                                                       {Kind::rotation, places_.rotation},
+                                                       {Kind::translation, places_.translation},
+                                                       {Kind::time, places_.time}};
+  for (const auto& [a, at_a] : kinds)
+    for (const auto& [b, at_b] : kinds)
+      if (const auto R = config.correlation(a, b); at_a && at_b && R.size() > 0)
+        correlation.block(*at_a, *at_b, R.rows(), R.cols()) = R;
+  constexpr double kRounding = 1e-9;  // of a correlation that was written and read
+  correlation.diagonal().array() += kRounding;
+  const Eigen::VectorXd weight = given_sigma_.cwiseInverse();
+  calibration_information_ =
+      weight.asDiagonal() * correlation.ldlt().solve(Eigen::MatrixXd::Identity(n, n)) * weight.asDiagonal();
 }
 
 const StaticParameters::Segment& StaticParameters::segment(const ContourOffset& contour,
@@ -55,14 +77,52 @@ Eigen::VectorXd StaticParameters::calibration_errors() const {
 }
 
 ParameterInformation StaticParameters::prior() const {
-  Eigen::VectorXd sigma(size_), value(size_);
-  sigma.head(calibration_size_) = calibration_sigma_;
+  Eigen::VectorXd value = Eigen::VectorXd::Zero(size_);
   value.head(calibration_size_) = calibration_errors();
-  for (const Segment& s : segments_) sigma(s.place) = s.sigma_m, value(s.place) = s.offset_m;
   ParameterInformation out;
-  const Eigen::VectorXd information = sigma.cwiseAbs2().cwiseInverse();
-  out.S = information.asDiagonal();
-  out.s = -information.cwiseProduct(value);
+  out.S = Eigen::MatrixXd::Identity(size_, size_);
+  out.S.topLeftCorner(calibration_size_, calibration_size_) = calibration_information_;
+  for (const Segment& s : segments_) {
+    out.S(s.place, s.place) = 1 / (s.sigma_m * s.sigma_m);
+    value(s.place) = s.offset_m;
+  }
+  out.s = -(out.S * value);
+  return out;
+}
+
+ParameterSolution StaticParameters::solve(const ParameterInformation& of_recordings, double trust) const {
+  ParameterInformation known = prior();
+  known.S.topLeftCorner(calibration_size_, calibration_size_) *= trust;
+  known.s.head(calibration_size_) *= trust;
+  known.add(of_recordings);
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(known.S);
+  return {ldlt.solve(known.s), ldlt.solve(Eigen::MatrixXd::Identity(size_, size_))};
+}
+
+Eigen::MatrixXd StaticParameters::calibration_correlation(Eigen::Index n, bool with_imu) const {
+  std::vector<std::pair<Eigen::Index, int>> known;  // place in the result, and here
+  const auto add = [&](std::optional<int> place, Eigen::Index at, Eigen::Index size) {
+    for (int i = 0; place && i < size; ++i) known.emplace_back(at + i, *place + i);
+  };
+  add(places_.intrinsics, 0, intrinsics_count_);
+  if (with_imu) {
+    add(places_.rotation, n, 3);
+    add(places_.translation, n + 3, 3);
+    add(places_.time, n + 6, 1);
+  }
+  const Eigen::MatrixXd& P = calibration_covariance_;
+  Eigen::MatrixXd out = with_imu ? Eigen::MatrixXd::Identity(n + 7, n + 7) : Eigen::MatrixXd::Identity(n, n);
+  for (const auto& [to_row, row] : known)
+    for (const auto& [to_column, column] : known)
+      if (to_row != to_column)
+        out(to_row, to_column) = P(row, column) / std::sqrt(P(row, row) * P(column, column));
+  return out;
+}
+
+double StaticParameters::change(const ParameterSolution& solution) const {
+  double out = 0;
+  for (int i = 0; i < calibration_size_; ++i)
+    out = std::max(out, std::abs(solution.z(i)) / std::sqrt(solution.covariance(i, i)));
   return out;
 }
 
@@ -73,10 +133,21 @@ void StaticParameters::add(const Calibration& found) {
   if (places_.translation) z.segment<3>(*places_.translation) = found.shift;
   if (places_.gravity) z.segment<2>(*places_.gravity) = found.gravity_tilt_rad;
   if (places_.intrinsics) z.segment(*places_.intrinsics, intrinsics_count_) = found.intrinsics;
-  correct(z, Eigen::MatrixXd::Zero(size_, size_));
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size_, size_);
+  const auto set = [&](std::optional<int> place, const Eigen::VectorXd& sigma) {
+    if (place) covariance.diagonal().segment(*place, sigma.size()) = sigma.cwiseAbs2();
+  };
+  set(places_.time, Eigen::VectorXd::Constant(1, found.time_sigma_s));
+  set(places_.rotation, found.turn_sigma_rad);
+  set(places_.translation, found.shift_sigma_m);
+  set(places_.gravity, found.gravity_sigma_rad);
+  set(places_.intrinsics, found.intrinsics_sigma);
+  correct({z, covariance});
 }
 
-void StaticParameters::correct(const Eigen::VectorXd& z, const Eigen::MatrixXd& covariance) {
+void StaticParameters::correct(const ParameterSolution& solution) {
+  const auto& [z, covariance] = solution;
+  calibration_covariance_ = covariance.topLeftCorner(calibration_size_, calibration_size_);
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   if (const auto at = places_.time) {
     found_.time_offset_s += z(*at);

@@ -21,8 +21,20 @@ Eigen::VectorXd ordinary(const CameraIntrinsics& c) {
 }  // namespace
 
 CalibrationSigma CalibrationSigma::known(const CameraIntrinsics& camera) {
-  return {std::vector<double>(4), std::vector<double>(camera.distortion.size()), Eigen::Vector3d::Zero(),
-          Eigen::Vector3d::Zero(), 0};
+  return {std::vector<double>(4),
+          std::vector<double>(camera.distortion.size()),
+          Eigen::Vector3d::Zero(),
+          Eigen::Vector3d::Zero(),
+          0,
+          {}};
+}
+
+Eigen::MatrixXd CalibrationSigma::of_correlation(const CameraIntrinsics& camera) const {
+  const auto n = 4 + static_cast<Eigen::Index>(camera.distortion.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n + 7, n + 7);
+  if (correlation && (correlation->rows() == n || correlation->rows() == n + 7))
+    out.topLeftCorner(correlation->rows(), correlation->rows()) = *correlation;
+  return out;
 }
 
 Eigen::VectorXd CalibrationSigma::of_intrinsics(const CameraIntrinsics& camera) const {

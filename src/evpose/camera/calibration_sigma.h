@@ -17,6 +17,9 @@ struct CalibrationSigma {
   std::optional<Eigen::Vector3d> rotation_rad;    ///< of the camera in the body, about the body's axes
   std::optional<Eigen::Vector3d> translation_m;   ///< of the camera in the body, along the body's axes
   std::optional<double> time_s;                   ///< of the IMU's clock against the camera's
+  /// Correlation of these errors, in the order above: n intrinsics with distortion, then 3 + 3 + 1; without
+  /// an IMU n alone. Unset: they are independent.
+  std::optional<Eigen::MatrixXd> correlation;
 
   /// All zero.
   static CalibrationSigma known(const CameraIntrinsics& camera);
@@ -24,6 +27,8 @@ struct CalibrationSigma {
   /// In the order of AdjustedCamera. Without a statement: focal length 0.3 %, centre 1 px, k1 0.01, further
   /// ones 0.02, p1 and p2 0.0005.
   Eigen::VectorXd of_intrinsics(const CameraIntrinsics& camera) const;
+  /// (n + 7) x (n + 7).
+  Eigen::MatrixXd of_correlation(const CameraIntrinsics& camera) const;
   Eigen::Vector3d of_rotation_rad() const { return rotation_rad.value_or(Eigen::Vector3d::Constant(5e-3)); }
   Eigen::Vector3d of_translation_m() const { return translation_m.value_or(Eigen::Vector3d::Constant(0.01)); }
   double of_time_s() const { return time_s.value_or(2e-3); }

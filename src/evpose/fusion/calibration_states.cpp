@@ -2,6 +2,7 @@
 #include "evpose/fusion/calibration_states.h"
 
 #include <cmath>
+#include <utility>
 
 namespace evpose {
 namespace {
@@ -68,7 +69,22 @@ void CalibrationStates::start(ErrorStateFilter& filter) {
   gravity_ = add(config_.gravity, Eigen::VectorXd::Constant(2, config_.start_gravity_sigma_rad));
   intrinsics_ = add(config_.intrinsics, config_.start_intrinsics_sigma);
   if (intrinsics_) found_.intrinsics.setZero(config_.start_intrinsics_sigma.size());
+  correlate(filter);
   state_sigmas(filter);
+}
+
+/// As the calibration's file states it.
+void CalibrationStates::correlate(ErrorStateFilter& filter) const {
+  if (config_.start_correlation.size() == 0) return;
+  using Kind = CalibrationConfig::Kind;
+  const std::pair<Kind, std::optional<BlockId>> blocks[] = {{Kind::intrinsics, intrinsics_},
+                                                            {Kind::rotation, rotation_},
+                                                            {Kind::translation, translation_},
+                                                            {Kind::time, time_}};
+  for (const auto& [kind, block] : blocks)
+    for (const auto& [other_kind, other] : blocks)
+      if (block && other && kind <= other_kind)
+        filter.set_covariance(*block, *other, config_.start_covariance(kind, other_kind));
 }
 
 void CalibrationStates::propagate(ErrorStateFilter& filter, const Eigen::Vector3d& gravity_map,

@@ -46,6 +46,7 @@ class CalibrationStates {
   const Calibration& calibration() const { return found_; }
 
  private:
+  void correlate(ErrorStateFilter& filter) const;
   void state_sigmas(const ErrorStateFilter& filter);
 
   CalibrationConfig config_;

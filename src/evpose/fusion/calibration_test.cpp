@@ -306,6 +306,30 @@ TEST(Calibration, WhatWasFoundOutlivesANewStart) {
   EXPECT_EQ(ekf.calibration().time_sigma_s, before.time_sigma_s);
 }
 
+TEST(Calibration, BeginsAsCorrelatedAsItIsStated) {
+  CalibrationConfig c = coarse();
+  c.time_offset = c.translation = c.intrinsics = true;
+  c.start_intrinsics_sigma = Eigen::Vector4d(2, 3, 0.5, 0.25);
+  c.start_correlation.setIdentity(11, 11);
+  const auto set = [&](int a, int b, double r) { c.start_correlation(a, b) = c.start_correlation(b, a) = r; };
+  set(0, 1, 0.9);   // both focal lengths
+  set(2, 8, -0.6);  // the centre and a place of the camera
+  set(9, 10, 0.3);  // another place and the time
+  FusionState state;
+  ErrorStateFilter filter;
+  filter.reset_state(state);
+  CalibrationStates(c, {}).start(filter);
+  const Eigen::MatrixXd P =
+      filter.joint_covariance().bottomRightCorner(8, 8);  // time, translation, intrinsics
+  const double place_m = c.start_translation_sigma_m.x();
+  EXPECT_DOUBLE_EQ(P(4, 5), 0.9 * 2 * 3);
+  EXPECT_DOUBLE_EQ(P(6, 2), -0.6 * 0.5 * place_m);
+  EXPECT_DOUBLE_EQ(P(2, 6), P(6, 2));
+  EXPECT_DOUBLE_EQ(P(3, 0), 0.3 * place_m * c.start_time_sigma_s);
+  EXPECT_DOUBLE_EQ(P(7, 7), 0.25 * 0.25);
+  EXPECT_EQ(P(1, 4), 0);
+}
+
 TEST(Calibration, TheSeenPoseDependsOnItAsDifferencesSay) {
   CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;

@@ -57,6 +57,13 @@ void ErrorStateFilter::reset_block(BlockId id, const Eigen::VectorXd& sigma) {
   blocks_.diagonal().segment(s.at, s.size) = sigma.cwiseAbs2();
 }
 
+void ErrorStateFilter::set_covariance(BlockId a, BlockId b, const Eigen::MatrixXd& covariance) {
+  const Slot &first = slot(a), &second = slot(b);
+  EVPOSE_CHECK(covariance.rows() == first.size && covariance.cols() == second.size);
+  blocks_.block(first.at, second.at, first.size, second.size) = covariance;
+  blocks_.block(second.at, first.at, second.size, first.size) = covariance.transpose();
+}
+
 void ErrorStateFilter::remove_block(BlockId id) {
   const Slot gone = slot(id);
   const Eigen::Index after = block_states() - gone.at - gone.size, left = block_states() - gone.size;

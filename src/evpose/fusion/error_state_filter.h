@@ -26,6 +26,8 @@ class ErrorStateFilter {
 
   /// A block of independent states of these standard deviations, correlated with nothing.
   BlockId add_block(const Eigen::VectorXd& sigma);
+  /// Covariance of two blocks, or of one; both were added or reset just now.
+  void set_covariance(BlockId a, BlockId b, const Eigen::MatrixXd& covariance);
   /// As if the block were removed and added anew.
   void reset_block(BlockId id, const Eigen::VectorXd& sigma);
   /// All else stays as it is known.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/fusion/fusion_config.h"
 
+#include <utility>
+
 #include "evpose/core/config.h"
 
 namespace evpose {
@@ -32,6 +34,44 @@ void describe(ConfigTable& table, CalibrationConfig& c) {
       "on", c.on,
       "estimate what is uncertain of the calibration: intrinsics, camera in the body, time offset (ekf)");
   table.add("gravity", c.gravity, "estimate the direction of gravity in the map (ekf)");
+}
+
+Eigen::MatrixXd CalibrationConfig::correlation(Kind a, Kind b) const {
+  if (start_correlation.size() == 0) return {};
+  const Eigen::Index n = start_correlation.rows() - 7;
+  const auto at = [&](Kind kind) -> std::pair<Eigen::Index, Eigen::Index> {
+    switch (kind) {
+      case Kind::intrinsics:
+        return {0, n};
+      case Kind::rotation:
+        return {n, 3};
+      case Kind::translation:
+        return {n + 3, 3};
+      case Kind::time:
+        break;
+    }
+    return {n + 6, 1};
+  };
+  const auto [first, rows] = at(a);
+  const auto [second, columns] = at(b);
+  return start_correlation.block(first, second, rows, columns);
+}
+
+Eigen::MatrixXd CalibrationConfig::start_covariance(Kind a, Kind b) const {
+  const auto sigma = [&](Kind kind) -> Eigen::VectorXd {
+    switch (kind) {
+      case Kind::intrinsics:
+        return start_intrinsics_sigma;
+      case Kind::rotation:
+        return start_rotation_sigma_rad;
+      case Kind::translation:
+        return start_translation_sigma_m;
+      case Kind::time:
+        break;
+    }
+    return Eigen::VectorXd::Constant(1, start_time_sigma_s);
+  };
+  return sigma(a).asDiagonal() * correlation(a, b) * sigma(b).asDiagonal();
 }
 
 Expected<FusionConfig> resolved(const FusionConfig& config, bool map_states_errors) {

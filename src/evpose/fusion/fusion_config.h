@@ -27,7 +27,13 @@ struct CalibrationConfig {
   Eigen::Vector3d start_translation_sigma_m = Eigen::Vector3d::Constant(0.01);
   Eigen::VectorXd start_intrinsics_sigma;  ///< as AdjustedCamera orders them
   double start_gravity_sigma_rad = 5e-3;   ///< about each horizontal axis
+  /// Of intrinsics, rotation, translation and time, in this order; empty: they are independent.
+  Eigen::MatrixXd start_correlation;
 
+  enum class Kind { intrinsics, rotation, translation, time };
+  /// Of states of two kinds at the start; empty without start_correlation.
+  Eigen::MatrixXd correlation(Kind a, Kind b) const;
+  Eigen::MatrixXd start_covariance(Kind a, Kind b) const;
   bool any() const { return time_offset || rotation || translation || gravity || intrinsics; }
 };
 void describe(ConfigTable& table, CalibrationConfig& config);

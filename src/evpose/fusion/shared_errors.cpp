@@ -21,12 +21,16 @@ int direction_of(const Eigen::Vector2d& normal_px) {
 
 }  // namespace
 
-void SharedErrors::add(const ContourOffset& contour, const BlockSample& sample,
-                       JointMeasurement& measurement) {
-  measurement.add_shared_error(0, kDelay_s * contour.speed_px_s, sample);
+std::array<SharedErrors::Effect, 2> SharedErrors::on(const ContourOffset& contour) {
   const int side = contour.darker < 0 ? -1 : 1;
   const double offset_px = std::hypot(kOffset_px, kOfMap * contour.sigma_m * contour.across_body.norm());
-  measurement.add_shared_error(1 + direction_of(side * contour.normal_px), side * offset_px, sample);
+  return {
+      {{0, kDelay_s * contour.speed_px_s}, {1 + direction_of(side * contour.normal_px), side * offset_px}}};
+}
+
+void SharedErrors::add(const ContourOffset& contour, const BlockSample& sample,
+                       JointMeasurement& measurement) {
+  for (const auto& [number, px] : on(contour)) measurement.add_shared_error(number, px, sample);
 }
 
 }  // namespace evpose

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+
 namespace evpose {
 
 class JointMeasurement;
@@ -13,12 +15,20 @@ struct ContourOffset;
 /// gain does not know of them. What they do to its estimate is followed
 /// (ErrorStateFilter::follow_shared_errors) and belongs to the pose's covariance.
 ///
-/// Estimated instead, they and a pose that drifts along its motion confirm each other.
+/// Estimated by the filter instead, they and a pose that drifts along its motion confirm each other; over a
+/// whole flight, which sees every direction from many places, they can be told apart.
 struct SharedErrors {
   static constexpr int kDirections = 8;           ///< of the darker side in the image
   static constexpr int kCount = 1 + kDirections;  ///< the delay, and an offset for each direction
 
-  /// Adds what they do to this contour's sample.
+  /// One of them, and by how much one sigma of it moves a sample's residual.
+  struct Effect {
+    int number;
+    double px;
+  };
+  /// On this contour: of the delay, and of the offset of its direction.
+  static std::array<Effect, 2> on(const ContourOffset& contour);
+  /// Adds them to this contour's sample.
   static void add(const ContourOffset& contour, const BlockSample& sample, JointMeasurement& measurement);
 };
 

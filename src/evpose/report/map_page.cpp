@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <numeric>
+
+#include "evpose/report/html_text.h"
 
 namespace evpose {
 namespace {
@@ -16,29 +17,6 @@ constexpr double kWidth = 900;    // px of a drawing
 constexpr double kTallest = 700;  // px
 constexpr std::array<const char*, kContourKinds> kKindColours{"#777777", "#0b62a4", "#d1495b",
                                                               "#8f5fbf", "#e08e0b", "#9aa5a0"};
-
-std::string format(const char* pattern, auto... values) {
-  char buffer[512];
-  std::snprintf(buffer, sizeof buffer, pattern, values...);
-  return buffer;
-}
-
-std::string escaped(const std::string& raw) {
-  std::string out;
-  for (const char c : raw) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '&')
-      out += "&amp;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 struct Bounds {
   Eigen::Vector3d low, high;
@@ -72,8 +50,9 @@ std::string scale_bar(const Projection& p) {
   const double wanted = kWidth / 6 / p.scale, power = std::pow(10, std::floor(std::log10(wanted)));
   const double metres = wanted / power >= 5 ? 5 * power : wanted / power >= 2 ? 2 * power : power;
   const double y = p.height - 12;
-  return format("<path d='M20 %.1fh%.1f' stroke='#000' stroke-width='3'/><text x='%.1f' y='%.1f'>%g m</text>",
-                y, metres * p.scale, 28 + metres * p.scale, y + 4, metres);
+  return formatted(
+      "<path d='M20 %.1fh%.1f' stroke='#000' stroke-width='3'/><text x='%.1f' y='%.1f'>%g m</text>", y,
+      metres * p.scale, 28 + metres * p.scale, y + 4, metres);
 }
 
 std::string draw_polygons(const ContourMap& map, const Projection& at) {
@@ -84,7 +63,7 @@ std::string draw_polygons(const ContourMap& map, const Projection& at) {
     const auto ring = [&](const MapPolygon& polygon) {
       for (std::size_t k = 0; k < polygon.vertices.size(); ++k) {
         const Eigen::Vector2d p = at(map.anchor + polygon.vertices[k].cast<double>());
-        path += format("%c%.1f %.1f", k == 0 ? 'M' : 'L', p.x(), p.y());
+        path += formatted("%c%.1f %.1f", k == 0 ? 'M' : 'L', p.x(), p.y());
       }
       path += "Z";
     };
@@ -105,7 +84,7 @@ std::string draw_contours(const ContourMap& map, const Projection& at) {
     const double half = p.length > 0 ? 0.5 * static_cast<double>(p.length) : 0.01;
     const Eigen::Vector3d t = half * p.tangent.cast<double>(), x = map.position(i);
     const Eigen::Vector2d a = at(x - t), b = at(x + t);
-    paths[static_cast<std::size_t>(p.kind)] += format("M%.1f %.1fL%.1f %.1f", a.x(), a.y(), b.x(), b.y());
+    paths[static_cast<std::size_t>(p.kind)] += formatted("M%.1f %.1fL%.1f %.1f", a.x(), a.y(), b.x(), b.y());
   }
   std::string out;
   for (std::size_t k = 0; k < paths.size(); ++k)
@@ -116,7 +95,7 @@ std::string draw_contours(const ContourMap& map, const Projection& at) {
 
 std::string drawing(const ContourMap& map, const Bounds& bounds, int first, int second) {
   const Projection at = projection(bounds, first, second);
-  return format(
+  return formatted(
              "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %.0f %.0f' font-family='sans-serif' "
              "font-size='12'>"
              "<rect width='100%%' height='100%%' fill='#fff'/>",
@@ -128,12 +107,12 @@ std::string drawing(const ContourMap& map, const Bounds& bounds, int first, int 
 std::string colour_of(double mm) {
   if (!(mm < 1000)) return "#bbbbbb";
   const double share = std::clamp(std::log(mm / 5) / std::log(10.0), 0.0, 1.0);
-  return format("hsl(%.0f,70%%,%.0f%%)", 120 * (1 - share), 45 + 10 * std::sin(std::numbers::pi * share));
+  return formatted("hsl(%.0f,70%%,%.0f%%)", 120 * (1 - share), 45 + 10 * std::sin(std::numbers::pi * share));
 }
 
 std::string heat_map(const AccuracySlice& slice, const ContourMap& map, const Bounds& bounds) {
   const Projection at = projection(bounds, 0, 1);
-  std::string out = format(
+  std::string out = formatted(
       "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %.0f %.0f' font-family='sans-serif' "
       "font-size='11'>",
       kWidth, at.height);
@@ -142,15 +121,16 @@ std::string heat_map(const AccuracySlice& slice, const ContourMap& map, const Bo
     for (int c = 0; c < slice.columns; ++c) {
       const ViewAccuracy& cell = slice.cells[static_cast<std::size_t>(r * slice.columns + c)];
       const Eigen::Vector2d corner = at({slice.x0 + c * slice.cell_m, slice.y0 + (r + 1) * slice.cell_m, 0});
-      out += format(
+      out += formatted(
           "<rect x='%.1f' y='%.1f' width='%.1f' height='%.1f' fill='%s'><title>%.1f mm along (%.2f %.2f "
           "%.2f), %.2f deg, %zu points</title></rect>",
           corner.x(), corner.y(), side, side, colour_of(cell.worst_mm).c_str(), cell.worst_mm,
           cell.worst_axis.x(), cell.worst_axis.y(), cell.worst_axis.z(), cell.angle_deg, cell.points);
       if (side > 26)
-        out += cell.worst_mm < 1000 ? format("<text x='%.1f' y='%.1f' text-anchor='middle'>%.0f</text>",
-                                             corner.x() + side / 2, corner.y() + side / 2 + 4, cell.worst_mm)
-                                    : "";
+        out += cell.worst_mm < 1000
+                   ? formatted("<text x='%.1f' y='%.1f' text-anchor='middle'>%.0f</text>",
+                               corner.x() + side / 2, corner.y() + side / 2 + 4, cell.worst_mm)
+                   : "";
     }
   return out + "<g opacity='.35'>" + draw_contours(map, at) + "</g>" + scale_bar(at) + "</svg>";
 }
@@ -171,9 +151,9 @@ std::string kinds_table(const ContourMap& map) {
   std::string out = "<table><tr><th>kind<th>points<th>length m<th>mean sigma mm</tr>";
   for (std::size_t k = 0; k < kinds.size(); ++k)
     if (kinds[k].points > 0)
-      out += format("<tr><td style='color:%s'>%s<td>%zu<td>%.1f<td>%.2f</tr>", kKindColours[k],
-                    kContourKindNames[k], kinds[k].points, kinds[k].length_m,
-                    kinds[k].length_m > 0 ? 1e3 * kinds[k].sigma_sum / kinds[k].length_m : 0.0);
+      out += formatted("<tr><td style='color:%s'>%s<td>%zu<td>%.1f<td>%.2f</tr>", kKindColours[k],
+                       kContourKindNames[k], kinds[k].points, kinds[k].length_m,
+                       kinds[k].length_m > 0 ? 1e3 * kinds[k].sigma_sum / kinds[k].length_m : 0.0);
   return out +
          "</table><p>Cylinder axes (of round bodies; sigma is their radius) and shadows depend on the view: "
          "nothing "
@@ -192,15 +172,15 @@ std::string planes_table(const ContourMap& map) {
   for (std::size_t k = 0; k < std::min<std::size_t>(12, order.size()); ++k) {
     const MapPlane& plane = map.planes[order[k]];
     const Eigen::Vector3d n = plane.normal.cast<double>();
-    out += format("<tr><td>%zu<td>%u<td>%.1f<td>%.3f %.3f %.3f<td>%.1f</tr>", order[k], plane.inliers,
-                  100 * plane.inliers / all, n.x(), n.y(), n.z(), 1e3 * static_cast<double>(plane.rms));
+    out += formatted("<tr><td>%zu<td>%u<td>%.1f<td>%.3f %.3f %.3f<td>%.1f</tr>", order[k], plane.inliers,
+                     100 * plane.inliers / all, n.x(), n.y(), n.z(), 1e3 * static_cast<double>(plane.rms));
   }
   return out + "</table>";
 }
 
 std::string slice_words(const AccuracySlice& slice) {
   const AccuracyShares shares = shares_of(slice);
-  return format(
+  return formatted(
       "<h3>Cameras at z = %.2f m</h3><p>%.0f %% of the cells are good to 5 mm, %.0f %% to 15 mm, %.0f %% to "
       "50 mm; %.0f %% tell no position.</p>",
       slice.height_m, 100 * shares.to_5mm, 100 * shares.to_15mm, 100 * shares.to_50mm, 100 * shares.none);
@@ -215,7 +195,7 @@ std::string map_drawing(const ContourMap& map, int view) {
 
 std::string map_page(const ContourMap& map, const AccuracySurvey& survey, double pitch_down_rad) {
   const Bounds b = bounds_of(map);
-  const std::string name = escaped(map.source.substr(map.source.rfind('/') + 1));
+  const std::string name = escaped_html(map.source.substr(map.source.rfind('/') + 1));
   std::string out = "<!doctype html><html lang='en'><meta charset='utf-8'><title>Map " + name +
                     "</title><style>body{font:15px/1.45 sans-serif;margin:2em auto;max-width:960px;padding:0 "
                     "1em;color:#222}"
@@ -224,16 +204,16 @@ std::string map_page(const ContourMap& map, const AccuracySurvey& survey, double
                     "td:first-child,th:first-child{text-align:left}svg{width:100%;height:auto;border:1px "
                     "solid #ddd}</style><h1>Map " +
                     name + "</h1>";
-  out += format(
+  out += formatted(
       "<p>%zu contour points, %zu planes, %zu occluding triangles; %.1f x %.1f x %.1f m, frame %s.</p>",
       map.points.size(), map.planes.size(), map.occluders.triangles.size(), b.high.x() - b.low.x(),
-      b.high.y() - b.low.y(), b.high.z() - b.low.z(), escaped(map.frame.substr(0, 60)).c_str());
+      b.high.y() - b.low.y(), b.high.z() - b.low.z(), escaped_html(map.frame.substr(0, 60)).c_str());
   out += kinds_table(map);
   out += "<h2>Plan</h2>" + drawing(map, b, 0, 1) + "<h2>Elevation, seen along y</h2>" +
          drawing(map, b, 0, 2) + "<h2>Elevation, seen along x</h2>" + drawing(map, b, 1, 2);
   out += "<h2>Largest planes</h2>" + planes_table(map);
   out += "<h2>Expected accuracy of the pose</h2>";
-  out += format(
+  out += formatted(
       "<p>One sigma of the position along its worst axis, mm, from the information in the visible contours: "
       "a 640 x 480 "
       "camera of 460 px focal length, %.0f deg down, the better middle of four headings. Points of a 32 px "

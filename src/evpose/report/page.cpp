@@ -3,33 +3,11 @@
 
 #include "evpose/core/error.h"
 #include "evpose/report/assets.h"
+#include "evpose/report/html_text.h"
 #include "evpose/report/series.h"
 
 namespace evpose {
 namespace {
-
-std::string escaped_html(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 /// In JSON `<` can only stand inside strings, where this means the same to JSON and nothing to HTML.
 std::string escaped_json(const std::string& json) {

@@ -213,10 +213,7 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   return job;
 }
 
-namespace {
-
-/// What was given of the calibration and is known of it in the end; none: it counted as known.
-std::optional<RunCalibration> calibration_of(const TrackJob& job, const Calibration& found) {
+std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibration& found) {
   const Recording& recording = job.recording;
   RunCalibration out;
   CalibratedCamera& given = out.given;
@@ -254,6 +251,8 @@ std::optional<RunCalibration> calibration_of(const TrackJob& job, const Calibrat
   return estimated ? std::optional(out) : std::nullopt;
 }
 
+namespace {
+
 /// Empty stays empty.
 std::string absolute(const std::string& path) {
   return path.empty() ? path : std::filesystem::absolute(path).lexically_normal().string();
@@ -276,7 +275,7 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
                           "), start: ", request.init, recording.has_imu ? "" : ", no IMU");
   summary.start = job.start_words;
   summary.findings = job.findings;
-  summary.calibration = calibration_of(job, found);
+  summary.calibration = run_calibration(job, found);
   summary.T_body_cam = job.setup.T_body_cam;
   if (summary.calibration && summary.calibration->found.T_cam_imu)
     summary.T_body_cam = summary.calibration->found.T_cam_imu->inverse();

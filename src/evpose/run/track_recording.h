@@ -66,6 +66,8 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
 /// `progress`, if any, is told the share of the recording, 0..1, and ends it by false.
 Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
                       const std::function<bool(double)>& progress);
+/// What was given of the calibration and is known of it in the end; none: it counted as known.
+std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibration& found);
 /// What the run folder is told at the end; without times and memory. `found`: of the calibration.
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker,
                      const Calibration& found);

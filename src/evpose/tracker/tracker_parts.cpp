@@ -79,6 +79,7 @@ void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
   if (!setup.intrinsics || !held) return;
   c.start_intrinsics_sigma = sigma.of_intrinsics(*setup.intrinsics);
   c.intrinsics = (c.start_intrinsics_sigma.array() > 0).any();
+  if (sigma.correlation) c.start_correlation = sigma.of_correlation(*setup.intrinsics);
 }
 
 }  // namespace evpose

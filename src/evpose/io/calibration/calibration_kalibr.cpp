@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -98,6 +99,31 @@ Expected<std::vector<double>> read_sigmas(const YamlDocument& document, const Ya
   return values;
 }
 
+/// Of all numbers with the placement and the time, or of the camera's alone.
+Status read_correlation(const YamlDocument& document, const YamlNode& node, CalibratedCamera& out) {
+  const YamlNode* at = node.find("calibration_correlation");
+  if (at == nullptr) return {};
+  const auto values = document.numbers(*at, "calibration_correlation");
+  if (!values) return values.error();
+  const std::size_t camera = 4 + out.intrinsics->distortion.size(), all = camera + 7;
+  const std::size_t n = values->size() == camera * camera ? camera : all;
+  if (values->size() != n * n)
+    return document.error(*at,
+                          text("calibration_correlation: ", values->size(), " numbers instead of ",
+                               camera * camera, " or ", all * all),
+                          "give a row for each sigma, or leave the key out");
+  const auto size = static_cast<Eigen::Index>(n);
+  const Eigen::MatrixXd R = Eigen::Map<const Eigen::MatrixXd>(values->data(), size, size);
+  constexpr double kRounding = 1e-6;
+  if (!((R.diagonal().array() - 1).abs().maxCoeff() < kRounding) ||
+      !((R - R.transpose()).cwiseAbs().maxCoeff() < kRounding) ||
+      !(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(R).eigenvalues()(0) > -kRounding))
+    return document.error(*at, "calibration_correlation: is no correlation matrix",
+                          "give a symmetric, positive one with 1 on its diagonal, or leave the key out");
+  out.sigma.correlation = R;
+  return {};
+}
+
 /// Keys of our own, beside Kalibr's.
 Status read_stated_sigma(const YamlDocument& document, const YamlNode& node, CalibratedCamera& out) {
   const auto intrinsics = read_sigmas(document, node, "intrinsics_sigma", {4});
@@ -119,15 +145,15 @@ Status read_stated_sigma(const YamlDocument& document, const YamlNode& node, Cal
     out.sigma.rotation_rad = kDegree * axes(0);
     out.sigma.translation_m = axes(1);
   }
-  const YamlNode* shift = node.find("timeshift_sigma");
-  if (shift == nullptr) return {};
-  const auto time = document.number(*shift, "timeshift_sigma");
-  if (!time) return time.error();
-  if (!(*time >= 0) || !std::isfinite(*time))
-    return document.error(*shift, text("timeshift_sigma: ", *time, " is no standard deviation"),
-                          "give seconds from 0 on; 0 means known");
-  out.sigma.time_s = *time;
-  return {};
+  if (const YamlNode* shift = node.find("timeshift_sigma")) {
+    const auto time = document.number(*shift, "timeshift_sigma");
+    if (!time) return time.error();
+    if (!(*time >= 0) || !std::isfinite(*time))
+      return document.error(*shift, text("timeshift_sigma: ", *time, " is no standard deviation"),
+                            "give seconds from 0 on; 0 means known");
+    out.sigma.time_s = *time;
+  }
+  return read_correlation(document, node, out);
 }
 
 /// Where a camera sits, by its own entries or through the camera before it.

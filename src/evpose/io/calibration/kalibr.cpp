@@ -49,6 +49,11 @@ Status write_kalibr_camera(const std::string& path, const CalibratedCamera& came
         "  T_cam_imu_sigma: " + list({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()}) + "\n";
   }
   if (sigma.time_s) out += "  timeshift_sigma: " + exact(*sigma.time_s) + "\n";
+  if (sigma.correlation) {
+    out += "  calibration_correlation:\n";
+    for (const auto& row : sigma.correlation->rowwise())
+      out += "  - " + list({row.begin(), row.end()}) + "\n";
+  }
   return write_text_file(path, out);
 }
 

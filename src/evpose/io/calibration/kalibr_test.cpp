@@ -71,8 +71,12 @@ TEST(Kalibr, WhatIsStatedOfTheErrorsIsReadAsWritten) {
   EXPECT_FALSE(one_each->sigma.intrinsics || one_each->sigma.time_s) << "stated in part";
 
   CalibratedCamera camera = *plain;
-  camera.sigma = {std::vector<double>{1, 2, 0.5, 0}, std::vector<double>{0.01, 0.02, 0, 1e-4},
-                  Eigen::Vector3d(1e-3, 2e-3, 0), Eigen::Vector3d(0, 0.002, 0.003), 5e-4};
+  camera.sigma = {std::vector<double>{1, 2, 0.5, 0},
+                  std::vector<double>{0.01, 0.02, 0, 1e-4},
+                  Eigen::Vector3d(1e-3, 2e-3, 0),
+                  Eigen::Vector3d(0, 0.002, 0.003),
+                  5e-4,
+                  {}};
   ASSERT_TRUE(write_kalibr_camera(folder / "all.yaml", camera).ok());
   const auto all = read_camera(folder / "all.yaml");
   ASSERT_TRUE(all.ok()) << error_line(all);
@@ -81,6 +85,31 @@ TEST(Kalibr, WhatIsStatedOfTheErrorsIsReadAsWritten) {
   EXPECT_TRUE(all->sigma.rotation_rad->isApprox(*camera.sigma.rotation_rad));
   EXPECT_EQ(*all->sigma.translation_m, *camera.sigma.translation_m);
   EXPECT_EQ(*all->sigma.time_s, 5e-4);
+}
+
+TEST(Kalibr, CorrelationsAreReadAsWritten) {
+  const TemporaryFolder folder;
+  auto camera = read_camera(folder.file("plain.yaml", kCamera));
+  ASSERT_TRUE(camera.ok());
+  for (const int n : {8, 15}) {  // the camera alone; with its pose and time
+    Eigen::MatrixXd R = Eigen::MatrixXd::Identity(n, n);
+    R(0, 1) = R(1, 0) = 0.1 + 1.0 / 3;
+    R(2, n - 1) = R(n - 1, 2) = -0.7;
+    camera->sigma.correlation = R;
+    ASSERT_TRUE(write_kalibr_camera(folder / "all.yaml", *camera).ok());
+    const auto again = read_camera(folder / "all.yaml");
+    ASSERT_TRUE(again.ok()) << error_line(again);
+    EXPECT_EQ(*again->sigma.correlation, R);
+  }
+  const auto line = [&](const std::string& value) {
+    return error_line(
+        read_camera(folder.file("c.yaml", kCamera + "  calibration_correlation: " + value + "\n")));
+  };
+  EXPECT_TRUE(says(line("[1, 2]"), {"c.yaml:13", "2 numbers instead of 64 or 225"}));
+  std::string rows = "[";
+  for (int i = 0; i < 64; ++i)
+    rows += std::string(i == 0 ? "" : ", ") + (i == 1 ? "2" : i % 9 == 0 ? "1" : "0");
+  EXPECT_TRUE(says(line(rows + "]"), {"c.yaml:13", "no correlation matrix"}));
 }
 
 TEST(Kalibr, SigmasThatAreNoneNameTheLine) {

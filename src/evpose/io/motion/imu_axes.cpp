@@ -47,27 +47,6 @@ std::vector<AxisNames> all_axis_names() {
   return out;
 }
 
-/// The names with the least cost; of nearly equal ones those that change least.
-struct Choice {
-  AxisNames names = AxisNames::Identity();
-  double cost = 0, as_read = 0;
-};
-template <class Cost>
-Choice choose(const Cost& cost) {
-  Choice out;
-  out.cost = out.as_read = cost(out.names);
-  std::vector<std::pair<double, AxisNames>> tried;
-  for (const AxisNames& names : all_axis_names()) tried.emplace_back(cost(names), names);
-  const double least = std::min_element(tried.begin(), tried.end(), [](const auto& a, const auto& b) {
-                         return a.first < b.first;
-                       })->first;
-  double kept = -4;
-  for (const auto& [value, names] : tried)
-    if (value <= 1.1 * least + 1e-9 && names.trace() > kept)
-      out.cost = value, out.names = names, kept = names.trace();
-  return out;
-}
-
 /// The first seconds, samples that come fast averaged.
 std::vector<ImuSample> first_part(const std::vector<ImuSample>& samples) {
   std::vector<ImuSample> out;
@@ -120,12 +99,6 @@ double gyro_rms(const std::vector<ImuSample>& samples) {
   return std::sqrt(square / static_cast<double>(samples.size()));
 }
 
-Error wrong_axes(const std::string& where, const std::string& sensor, const std::string& by,
-                 const AxisNames& names) {
-  return {where, text("the ", sensor, "'s axes do not fit ", by, ": they would if ", in_words(names)),
-          "rename the columns (imu.columns in recording.yaml), or correct the signs in the driver"};
-}
-
 /// Over one window of the reference: its turn and its mean specific force, and those of the IMU.
 struct Window {
   Eigen::Vector3d turn, imu_turn;    ///< rad
@@ -170,6 +143,27 @@ std::vector<Window> windows_of(const std::vector<TimedPose>& reference,
 
 }  // namespace
 
+AxisChoice choose_axes(const std::function<double(const AxisNames&)>& cost) {
+  AxisChoice out;
+  out.cost = out.as_read = cost(out.names);
+  std::vector<std::pair<double, AxisNames>> tried;
+  for (const AxisNames& names : all_axis_names()) tried.emplace_back(cost(names), names);
+  const double least = std::min_element(tried.begin(), tried.end(), [](const auto& a, const auto& b) {
+                         return a.first < b.first;
+                       })->first;
+  double kept = -4;
+  for (const auto& [value, names] : tried)
+    if (value <= 1.1 * least + 1e-9 && names.trace() > kept)
+      out.cost = value, out.names = names, kept = names.trace();
+  return out;
+}
+
+Error wrong_axes(const std::string& where, const std::string& sensor, const std::string& by,
+                 const AxisNames& names) {
+  return {where, text("the ", sensor, "'s axes do not fit ", by, ": they would if ", in_words(names)),
+          "rename the columns (imu.columns in recording.yaml), or correct the signs in the driver"};
+}
+
 std::string in_words(const AxisNames& names) {
   std::string out;
   for (int i = 0; i < 3; ++i) {
@@ -195,7 +189,7 @@ std::optional<Error> doubt_gyro_by_gravity(const std::vector<ImuSample>& samples
              "mean square ",
              rms, ", were deg/s, not rad/s"),
         "set imu.gyro_unit: deg/s in recording.yaml"};
-  const Choice choice = choose([&](const AxisNames& names) { return force_spread(part, names); });
+  const AxisChoice choice = choose_axes([&](const AxisNames& names) { return force_spread(part, names); });
   if (choice.cost > kExplainedShare * as_read) return {};
   return wrong_axes(where, "gyroscope", "the accelerometer's gravity", choice.names);
 }
@@ -247,13 +241,13 @@ std::vector<Error> doubt_axes_against(const std::vector<TimedPose>& reference,
     return std::sqrt(square / static_cast<double>(windows.size()));
   };
   const double turns = rms([](const Window& w) { return w.turn; });
-  const Choice gyro = choose([&](const AxisNames& names) {
+  const AxisChoice gyro = choose_axes([&](const AxisNames& names) {
     return rms([&](const Window& w) { return Eigen::Vector3d(names * w.imu_turn - w.turn); });
   });
   if (turns > kLeastTurn_rad && gyro.as_read > kWrongShare * turns &&
       gyro.cost < std::min(kRightShare * turns, kRighter * gyro.as_read))
     out.push_back(wrong_axes(where, "gyroscope", "the turns of the ground truth", gyro.names));
-  const Choice accel = choose([&](const AxisNames& names) {
+  const AxisChoice accel = choose_axes([&](const AxisNames& names) {
     return rms([&](const Window& w) { return Eigen::Vector3d(names * w.imu_force - w.force); });
   });
   if (accel.as_read > kWrongForce_m_s2 && accel.cost < kRightForce_m_s2)

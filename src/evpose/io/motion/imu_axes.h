@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,17 @@ namespace evpose {
 using AxisNames = Eigen::Matrix3d;
 /// "x is y, y is -x, z is z".
 std::string in_words(const AxisNames& names);
+
+/// The names with the least cost; of nearly equal ones those that change least.
+struct AxisChoice {
+  AxisNames names = AxisNames::Identity();
+  double cost = 0, as_read = 0;
+};
+/// `cost`: positive, of each names.
+AxisChoice choose_axes(const std::function<double(const AxisNames&)>& cost);
+/// That a sensor's axes do not fit what `by` names, and which would.
+Error wrong_axes(const std::string& where, const std::string& sensor, const std::string& by,
+                 const AxisNames& names);
 
 /// What the IMU alone says of its axes and units. Turned by the gyroscope, the mean specific force of half
 /// seconds stays where it is, up to the acceleration of the flight; a gyroscope with swapped or mirrored

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/calibrate/calibrate_recordings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "evpose/calibrate/calibration_words.h"
+#include "evpose/calibrate/data_sheet.h"
+#include "evpose/calibrate/joint_calibration.h"
+#include "evpose/core/log.h"
+#include "evpose/io/calibration/kalibr.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/run/progress.h"
+
+namespace evpose {
+namespace {
+
+constexpr double kRefuted = 5;  // given sigmas by which the events may contradict what was given
+
+bool is_known(const CalibrationSigma& sigma, const Recording& recording) {
+  const bool mounting = sigma.of_rotation_rad().isZero(0) && sigma.of_translation_m().isZero(0);
+  return sigma.of_intrinsics(recording.camera).isZero(0) &&
+         (!recording.has_imu || (mounting && sigma.of_time_s() == 0));
+}
+
+Expected<TrackJob> job_of(const TrackRequest& request, const RunConfig& config) {
+  auto job = prepare(request, config);
+  if (!job) return job;
+  // It looks for a pose as the given calibration would see it; the alignment of the start looks for both.
+  job->config.tracker.relocalization.on = false;
+  Recording& recording = job->recording;
+  recording.camera = with_distortion(recording.camera);
+  const CalibrationSigma sigma = data_sheet_sigma(recording.calibration_sigma, recording.camera);
+  if (is_known(sigma, recording))
+    return Error{recording.calibration_path, "states that all of it is known",
+                 "leave out the sigmas that are zero, or give another one with --start"};
+  recording.calibration_sigma = sigma;
+  job->setup.intrinsics = recording.camera;
+  job->setup.calibration_sigma = sigma;
+  auto camera = make_camera(recording.camera);
+  if (!camera) return Error{recording.calibration_path, camera.error().what, camera.error().fix};
+  job->setup.camera = *camera;
+  return job;
+}
+
+/// One job a recording, all with the calibration of the request or else of the first recording.
+Expected<std::vector<TrackJob>> jobs_of(const CalibrateRequest& request) {
+  TrackRequest one = request.track;
+  const auto config = load_config(one);
+  if (!config) return config.error();
+  if (!config->tracker.fusion.calibration.on)
+    return Error{"fusion.calibration.on", "is false: nothing would be calibrated", "leave it out"};
+  std::vector<TrackJob> jobs;
+  for (const std::string& recording : request.recordings) {
+    one.recording = recording;
+    auto job = job_of(one, *config);
+    if (!job) return job.error();
+    if (one.calibration.empty()) one.calibration = job->recording.calibration_path;
+    if (!jobs.empty() && job->recording.has_imu != jobs.front().recording.has_imu)
+      return Error{recording, "has an IMU and the first recording has none, or the other way round",
+                   "calibrate recordings of one kind together"};
+    jobs.push_back(std::move(*job));
+  }
+  return jobs;
+}
+
+FlightMotion motion_of(const JointCalibration& joint, std::size_t k) {
+  FlightMotion out;
+  out.name = joint.job(k).recording.name;
+  out.accepted = joint.accepted_share(k);
+  out.coverage = joint.residuals_of(k).coverage();
+  const std::vector<FusionState>& states = joint.flight(k).trajectory();
+  out.duration_s = to_seconds(states.back().t - states.front().t);
+  Eigen::Vector3d rates = Eigen::Vector3d::Zero();
+  double speeds = 0, accelerations = 0;
+  // Over a while, since velocities from state to state are noisy.
+  constexpr std::size_t kApart = 15;
+  std::size_t count = 0;
+  for (std::size_t i = kApart; i < states.size(); i += kApart, ++count) {
+    const FusionState &a = states[i - kApart], &b = states[i];
+    const double dt_s = to_seconds(b.t - a.t);
+    rates += (so3::log(a.nav.T_map_body.q.conjugate() * b.nav.T_map_body.q) / dt_s).cwiseAbs2();
+    speeds += b.nav.velocity.squaredNorm();
+    accelerations += (b.nav.velocity - a.nav.velocity).squaredNorm() / (dt_s * dt_s);
+  }
+  const double n = static_cast<double>(std::max<std::size_t>(1, count));
+  out.rate_deg_s = (rates / n).cwiseSqrt() * (180 / M_PI);
+  out.speed_m_s = std::sqrt(speeds / n);
+  out.acceleration_m_s2 = std::sqrt(accelerations / n);
+  return out;
+}
+
+CalibrationPage page_of(const JointCalibration& joint, const RunCalibration& calibration) {
+  const TrackJob& first = joint.job(0);
+  CalibrationPage page;
+  page.title = "Calibration of " + first.recording.name;
+  const std::size_t more = joint.size() - 1;
+  page.subtitle = text("map ", first.map->source.substr(first.map->source.rfind('/') + 1),
+                       more > 0 ? text(", and ", more, " more recording", more > 1 ? "s" : "") : "",
+                       first.recording.has_imu ? "" : ", no IMU: the camera alone is calibrated");
+  page.size = first.recording.camera.size;
+  page.numbers = numbers_of(calibration);
+  page.correlation = *calibration.found.sigma.correlation;
+  const auto found = make_camera(*calibration.found.intrinsics);
+  if (found) page.before = model_difference(*first.setup.camera, **found);
+  page.after = joint.residuals().arrows();
+  page.radius = joint.residuals().by_radius();
+  for (std::size_t k = 0; k < joint.size(); ++k) page.flights.push_back(motion_of(joint, k));
+  page.words = calibration_words(page);
+  return page;
+}
+
+/// The number that contradicts the events most, in words; empty if none does.
+std::string refuted_words(const JointCalibration& joint, const std::vector<CalibrationNumber>& numbers) {
+  Eigen::Index worst = 0;
+  const Eigen::VectorXd off = joint.contradiction();
+  if (off.size() == 0 || !(off.cwiseAbs().maxCoeff(&worst) > kRefuted)) return "";
+  // Those that the file lists, by the largest change in given sigmas.
+  const auto number = std::ranges::max_element(numbers, {}, [](const CalibrationNumber& n) {
+    return n.given_sigma > 0 ? std::abs(n.found - n.given) / n.given_sigma : 0;
+  });
+  return text("the events refute the given calibration by ", std::lround(std::abs(off(worst))),
+              " of its sigmas (", number->name, "); it was taken for a data sheet's");
+}
+
+struct Estimate {
+  std::unique_ptr<JointCalibration> joint;
+  RunCalibration calibration;
+};
+
+Expected<Estimate> estimate(std::vector<TrackJob> jobs, const TrackRequest& request,
+                            const JointCalibration::Progress& progress) {
+  Estimate out{std::make_unique<JointCalibration>(std::move(jobs)), {}};
+  if (auto ok = out.joint->estimate(request, progress); !ok) return ok.error();
+  if (out.joint->interrupted()) return out;
+  const auto found = run_calibration(out.joint->job(0), out.joint->found());
+  EVPOSE_CHECK(found.has_value());
+  out.calibration = *found;
+  out.calibration.found.sigma.correlation = out.joint->correlation();
+  return out;
+}
+
+/// Again, as if the calibration's sigmas had not been stated.
+std::vector<TrackJob> without_stated_sigmas(std::vector<TrackJob> jobs) {
+  for (TrackJob& job : jobs) {
+    job.recording.calibration_sigma = only_data_sheet(job.recording.calibration_sigma, job.recording.camera);
+    job.setup.calibration_sigma = job.recording.calibration_sigma;
+  }
+  return jobs;
+}
+
+std::string report_path(const std::string& chain) {
+  return std::filesystem::path(chain).replace_extension(".html").string();
+}
+
+Status check_output(const TrackRequest& request) {
+  for (const std::string& path : {request.output, report_path(request.output)})
+    if (!request.replace && std::filesystem::exists(path))
+      return Error{path, "exists", "give another name with -o, or --force"};
+  return {};
+}
+
+}  // namespace
+
+Expected<std::optional<CalibrateOutcome>> calibrate_recordings(const CalibrateRequest& request) {
+  if (auto ok = check_output(request.track); !ok) return ok.error();
+  const auto jobs = jobs_of(request);
+  if (!jobs) return jobs.error();
+  for (const TrackJob& job : *jobs)
+    for (const Error& finding : job.findings) log_warning(finding.line());
+  Progress shown("calibrating");
+  const auto progress = [&](double share) {
+    shown.at(share);
+    return !(request.track.interrupted && request.track.interrupted());
+  };
+  auto found = estimate(*jobs, request.track, progress);
+  if (found && found->joint->interrupted()) return std::optional<CalibrateOutcome>();
+  const CalibrationSigma& stated = jobs->front().recording.calibration_sigma;
+  const bool narrow = stated.intrinsics &&
+                      only_data_sheet(stated, jobs->front().recording.camera).intrinsics != stated.intrinsics;
+  std::string refuted;
+  if (narrow && found) refuted = refuted_words(*found->joint, numbers_of(found->calibration));
+  if (narrow && !found)
+    refuted =
+        "the contours are nowhere near where the given calibration and its sigmas have them; it was taken "
+        "for a data sheet's";
+  if (!refuted.empty()) {
+    found = estimate(without_stated_sigmas(*jobs), request.track, progress);
+    if (found && found->joint->interrupted()) return std::optional<CalibrateOutcome>();
+  }
+  if (!found) return found.error();
+  shown.done();
+
+  CalibrateOutcome out;
+  out.page = page_of(*found->joint, found->calibration);
+  out.converged = found->joint->converged();
+  if (!out.converged)
+    out.page.words.insert(out.page.words.begin(),
+                          "the passes did not come to rest: trust no sigma of this calibration");
+  if (!refuted.empty()) out.page.words.insert(out.page.words.begin(), refuted);
+  out.report = report_path(request.track.output);
+  if (auto ok = write_kalibr_camera(request.track.output, found->calibration.found); !ok) return ok.error();
+  if (auto ok = write_text_file(out.report, calibration_page(out.page)); !ok) return ok.error();
+  return std::optional<CalibrateOutcome>(std::move(out));
+}
+
+}  // namespace evpose

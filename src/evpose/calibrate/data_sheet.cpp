@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/calibrate/data_sheet.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace evpose {
+namespace {
+
+constexpr double kFocal = 0.05, kAspect = 5e-3;  // relative; of the ratio of both focal lengths
+constexpr double kCentre = 0.03;                 // of the image's width
+constexpr double kRadial = 0.1, kTangential = 2e-3;
+constexpr double kRotation_rad = 2 * M_PI / 180, kTranslation_m = 0.03, kTime_s = 0.01;
+
+std::vector<double> distortion_sigma(const CameraIntrinsics& camera) {
+  std::vector<double> out(camera.distortion.size(), kRadial);
+  if (camera.distortion_model == "radtan") std::fill_n(out.begin() + 2, 2, kTangential);
+  return out;
+}
+
+bool all_zero(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double v) { return v == 0; });
+}
+
+}  // namespace
+
+CalibrationSigma data_sheet_sigma(const CalibrationSigma& stated, const CameraIntrinsics& camera) {
+  CalibrationSigma out = stated;
+  if (!out.intrinsics) {
+    out.intrinsics = {kFocal * camera.fx, kFocal * camera.fy, kCentre * camera.size.width,
+                      kCentre * camera.size.width};
+    const auto n = 4 + static_cast<Eigen::Index>(camera.distortion.size());
+    Eigen::MatrixXd R = Eigen::MatrixXd::Identity(n + 7, n + 7);
+    // Both focal lengths are one, but for the pixels' aspect: its variance is 2 (1 - r) kFocal^2.
+    R(0, 1) = R(1, 0) = 1 - 0.5 * std::pow(kAspect / kFocal, 2);
+    if (!out.correlation) out.correlation = R;
+  }
+  if (!out.distortion) out.distortion = distortion_sigma(camera);
+  if (!out.rotation_rad) out.rotation_rad = Eigen::Vector3d::Constant(kRotation_rad);
+  if (!out.translation_m) out.translation_m = Eigen::Vector3d::Constant(kTranslation_m);
+  if (!out.time_s) out.time_s = kTime_s;
+  return out;
+}
+
+CalibrationSigma only_data_sheet(const CalibrationSigma& stated, const CameraIntrinsics& camera) {
+  CalibrationSigma known;
+  if (stated.intrinsics && all_zero(*stated.intrinsics)) known.intrinsics = stated.intrinsics;
+  if (stated.distortion && all_zero(*stated.distortion)) known.distortion = stated.distortion;
+  if (stated.rotation_rad && stated.rotation_rad->isZero(0)) known.rotation_rad = stated.rotation_rad;
+  if (stated.translation_m && stated.translation_m->isZero(0)) known.translation_m = stated.translation_m;
+  if (stated.time_s && *stated.time_s == 0) known.time_s = 0;
+  return data_sheet_sigma(known, camera);
+}
+
+CameraIntrinsics with_distortion(CameraIntrinsics camera) {
+  if (camera.distortion_model != "none") return camera;
+  camera.distortion_model = "radtan";
+  camera.distortion.assign(4, 0);
+  return camera;
+}
+
+}  // namespace evpose

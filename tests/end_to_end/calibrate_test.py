@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calibrating from recordings before a known map. calibrate_test.py EVPOSE"""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import h5py  # noqa: F401: the recordings need it
+except ImportError as missing:
+    print(f"skipped: {missing}: scripts/packages.sh test")
+    sys.exit(77)
+
+from recording import CALIBRATION, Recording
+
+EVPOSE = None
+SCENARIO = pathlib.Path(__file__).resolve().parents[2] / "scenarios/turning_2.yaml"
+TINY = ["camera.size=custom", "camera.width=320", "camera.height=240", "camera.focal_px=190"]
+
+
+def numbers(chain, key):
+    """Of a list on one line of a camera chain."""
+    return [float(word) for word in re.search(rf"^  {key}: \[(.*)\]$", chain, re.MULTILINE).group(1).split(",")]
+
+
+class CalibrateTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.root = pathlib.Path(scratch.name)
+
+    def evpose(self, *words):
+        return subprocess.run([str(word) for word in (EVPOSE, "-q", *words)], capture_output=True, text=True, timeout=280,
+                              stdin=subprocess.DEVNULL)
+
+    def calibrate(self, recording, start, *words):
+        path = self.root / "start.yaml"
+        path.write_text(start)
+        return self.evpose("calibrate", recording, "--map", recording / "contours.ply", "--start", path, "-o",
+                           self.root / "found.yaml", *words)
+
+    def test_a_camera_that_is_far_off_is_found_and_every_command_reads_it(self):
+        flight = self.root / "flight"
+        made = self.evpose("simulate", SCENARIO, "-o", flight, "--duration", 1,
+                           *(word for setting in TINY for word in ("--set", setting)))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        truth = (flight / "camchain-imucam.yaml").read_text()
+        fx, fy, cx, cy = numbers(truth, "intrinsics")
+        start = re.sub(r"intrinsics: \[.*\]", f"intrinsics: [{1.03 * fx}, {1.03 * fy}, {cx + 5}, {cy - 5}]", truth)
+        start = re.sub(r"distortion_coeffs: \[.*\]", "distortion_coeffs: [0, 0, 0, 0]", start)
+        start = re.sub(r".*_sigma: .*\n", "", start)
+        done = self.calibrate(flight, start, "--occluders", flight / "mesh.ply")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        chain = (self.root / "found.yaml").read_text()
+        for key in ("intrinsics", "distortion_coeffs"):
+            sigmas = numbers(chain, key.replace("_coeffs", "") + "_sigma")
+            for found, sigma, number in zip(numbers(chain, key), sigmas, numbers(truth, key)):
+                self.assertLess(abs(found - number), 4 * sigma)
+        self.assertLess(abs(numbers(chain, "intrinsics")[0] / fx - 1), 0.002)
+        self.assertIn("calibration_correlation", chain)
+        self.assertIn("<svg", (self.root / "found.html").read_text())
+        self.assertEqual(self.evpose("info", self.root / "found.yaml").returncode, 0)
+        again = self.calibrate(flight, start)
+        self.assertEqual(again.returncode, 2)
+        self.assertIn("found.yaml: exists", again.stderr)
+        known = self.evpose("calibrate", flight, "--map", flight / "contours.ply", "-o", self.root / "other.yaml")
+        self.assertEqual(known.returncode, 2)
+        self.assertIn("all of it is known", known.stderr)
+
+    def test_what_a_short_slide_does_not_tell_is_said(self):
+        done = self.calibrate(Recording().write(self.root / "recording"), CALIBRATION)
+        self.assertIn(done.returncode, (0, 1), done.stderr)
+        self.assertIn("the motion does not tell time", done.stdout)
+        self.assertIn("the motion does not tell place", done.stdout)
+
+    def test_what_cannot_be_calibrated_is_said_in_one_line(self):
+        data = Recording()
+        recording = data.write(self.root / "recording")
+        zero = re.sub(r"intrinsics: \[[^,]*", "intrinsics: [0.0", CALIBRATION)
+        negative = CALIBRATION + "  intrinsics_sigma: [1, 1, -1, 1]\n"
+        for start, said in ((zero, "focal"), (negative, "is no standard deviation")):
+            done = self.calibrate(recording, start)
+            self.assertEqual(done.returncode, 2, done.stdout)
+            self.assertIn(said, done.stderr)
+            self.assertEqual(len(done.stderr.strip().splitlines()), 1, done.stderr)
+            self.assertFalse((self.root / "found.yaml").exists())
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    EVPOSE = sys.argv.pop(1)
+    unittest.main()

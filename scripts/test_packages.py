@@ -315,7 +315,7 @@ def tried(name):
         counts["python3-evpose"] = try_python(system, debs["python3-evpose"], held)
         counts["libevpose-dev"] = try_library(system, debs["libevpose-dev"], held)
         try_removal(system, held)
-        try_wheel(system, wheel, "without a network" if name == DEBIAN else "with one, for npm", held)
+        try_wheel(system, wheel, "without a network" if name == DEBIAN else "with a network, for npm", held)
         table = list(rows(debs, counts))
     return ["", f"Sources of commit `{commit}`.", "", "| package | section | MB | installed MiB | with its dependencies |",
             "|---|---|---|---|---|", *table, "", *(f"- {what}" for what in held), ""]

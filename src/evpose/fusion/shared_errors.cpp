@@ -12,6 +12,16 @@ namespace {
 // Of one sigma; docs/decisions/tracking.md has what they were chosen on.
 constexpr double kDelay_s = 2e-3, kOffset_px = 0.08;
 constexpr double kOfMap = 3;  // the offset of a built map's contours, in sigmas that the map states
+// Texture beside the contours moves along with them: the fewer events are of contours, the further it draws
+// their mean.
+constexpr double kClear = 0.6;  // concentration on which the offset was chosen
+constexpr double kLeastConcentration = 0.15;
+
+/// By how much the offset is larger than where few events are of anything but contours.
+double by_clutter(double concentration) {
+  const auto clutter = [](double share) { return (1 - share) / std::max(share, kLeastConcentration); };
+  return concentration > 0 ? std::max(1.0, clutter(concentration) / clutter(kClear)) : 1;
+}
 
 int direction_of(const Eigen::Vector2d& normal_px) {
   constexpr double kWidth_rad = 2 * std::numbers::pi / SharedErrors::kDirections;
@@ -23,7 +33,8 @@ int direction_of(const Eigen::Vector2d& normal_px) {
 
 std::array<SharedErrors::Effect, 2> SharedErrors::on(const ContourOffset& contour) {
   const int side = contour.darker < 0 ? -1 : 1;
-  const double offset_px = std::hypot(kOffset_px, kOfMap * contour.sigma_m * contour.across_body.norm());
+  const double offset_px = by_clutter(contour.concentration) *
+                           std::hypot(kOffset_px, kOfMap * contour.sigma_m * contour.across_body.norm());
   return {
       {{0, kDelay_s * contour.speed_px_s}, {1 + direction_of(side * contour.normal_px), side * offset_px}}};
 }

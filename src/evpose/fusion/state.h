@@ -60,6 +60,7 @@ struct ContourOffset {
       Eigen::Vector2d::Zero();  ///< unit, in the image, to where distances are positive
   double speed_px_s = 0;        ///< of the contour along the normal
   int darker = 0;               ///< +1: it is darker where the normal points, -1: brighter, 0: not known
+  double concentration = 0;     ///< share of the events in the gates that is of contours; 0: not known
   /// Derivative of an event's signed distance by the numbers of the camera; empty: not asked for.
   Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 9> by_intrinsics{};
 

@@ -10,7 +10,7 @@ namespace evpose {
 namespace {
 
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
-constexpr double kConfirmed_s = 0.013;    // two looks: a few pieces of contours agree by chance for a moment
+constexpr double kConfirmed_s = 0.04;     // four looks: a few pieces of contours agree by chance for a moment
 constexpr double kContradicted_s = 0.05;  // by chance, few contours have events for so long
 constexpr double kHopeless_s = 1;         // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
@@ -85,8 +85,11 @@ bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) 
   return searching() || t < verify_until_ || found_pose_is_refuted(t, r);
 }
 
+/// Contours of a map that may be wrong can lie where no events are at the right pose, too. A search would
+/// then leave it for one that only looks better.
 bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const {
-  return !r.consistent || is_contradicted() || (health == Health::lost && !verifying());
+  const bool refuted = !r.consistent || is_contradicted();
+  return (refuted && !(verified_ && map_may_be_wrong_)) || (health == Health::lost && !verifying());
 }
 
 bool PoseSupervisor::search_is_due() const { return config_.on && !searching() && astray_s_ > kPatience_s; }
@@ -122,7 +125,9 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
 }
 
 Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::string* reason) {
-  const FusionState state = fusion.reported_state();
+  const FusionState state = fusion.state();
+  // Errors that all contours share move pose and contours together: they belong to the covariance that is
+  // told, not to how far a contour may lie from where it is looked for.
   const PoseUncertainty uncertainty(state, e.focal_px, e.typical_depth_m);
   take_verdict(e.span_s);
   const bool refuted = found_pose_is_refuted(e.t, e.registration);

@@ -28,9 +28,11 @@ struct UpdateEvidence {
 /// notices when it has gone astray, and names the tracker's health.
 class PoseSupervisor {
  public:
+  /// `map_may_be_wrong`: the map states errors of its contours.
   PoseSupervisor(const RelocalizationConfig& relocalization, const HealthConfig& health,
-                 Relocalizer relocalizer, PoseVerifier verifier)
+                 Relocalizer relocalizer, PoseVerifier verifier, bool map_may_be_wrong)
       : config_(relocalization),
+        map_may_be_wrong_(map_may_be_wrong),
         health_config_(health),
         relocalizer_(std::move(relocalizer)),
         verifier_(std::move(verifier)),
@@ -85,6 +87,7 @@ class PoseSupervisor {
   void begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance);
 
   RelocalizationConfig config_;
+  bool map_may_be_wrong_;
   HealthConfig health_config_;
   Relocalizer relocalizer_;
   PoseVerifier verifier_;

@@ -77,7 +77,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
                   Relocalizer({map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                                config.visible, config.event_registration}),
                   PoseVerifier(setup_.camera->size(), map_.segments.count,
-                               config.visible.occlusion && !map_.index.occluders().empty())),
+                               config.visible.occlusion && !map_.index.occluders().empty()),
+                  states_errors(*setup_.map)),
       reporter_(std::move(clock)),
       start_t_(start.t),
       last_update_(start.t),
@@ -297,7 +298,7 @@ int Tracker::darker_side(std::uint32_t segment) const {
   return contrast == nullptr ? 0 : -contrast->map_contrast(segment);
 }
 
-ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
+ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concentration) const {
   const Pose& predicted = fusion_->state().nav.T_map_body;
   const ContourSample& s = contours_.samples()[offset.sample];
   ContourOffset out{predicted.inverse() * map_.map->position(s.point),
@@ -308,7 +309,8 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
                     map_.map->points[s.point].sigma,
                     s.normal_px,
                     s.speed_px_s,
-                    s.normal_side * darker_side(s.segment)};
+                    s.normal_side * darker_side(s.segment),
+                    concentration};
   if (!adjusted_) return out;
   const auto by_numbers = adjusted_->by_numbers(T_body_cam_.inverse() * out.point_body);
   if (by_numbers) out.by_intrinsics = -s.normal_px.transpose() * *by_numbers;
@@ -318,7 +320,8 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset) const {
 void Tracker::fuse(const RegistrationResult& measurement) {
   offsets_.clear();
   if (fusion_->takes_contours())
-    for (const SampleOffset& offset : registration_->offsets()) offsets_.push_back(contour_offset(offset));
+    for (const SampleOffset& offset : registration_->offsets())
+      offsets_.push_back(contour_offset(offset, measurement.gate_concentration));
   fusion_->update({measurement.information, measurement.vector}, offsets_);
   take_calibration();
 }

@@ -122,7 +122,7 @@ class Tracker {
   void take_calibration();
   RegistrationResult measure(TimeNs t, double span_s);
   int darker_side(std::uint32_t segment) const;
-  ContourOffset contour_offset(const SampleOffset& offset) const;
+  ContourOffset contour_offset(const SampleOffset& offset, double concentration) const;
   void fuse(const RegistrationResult& measurement);
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);
   std::string fault(TimeNs t, const RegistrationResult& measurement) const;

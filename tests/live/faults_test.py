@@ -109,7 +109,7 @@ class FaultsTest(ServingTest):
         out, err = self.finish(process)
         self.assertRegex(err, r"restarted: the clock of the (IMU|events) went back by (1|0\.99)")
         self.assertRegex(out, r"\b1 restarts")
-        self.assertRegex(out, r"^(tracking|degraded)")
+        self.assertRegex(out, r"^(tracking|degraded|initialising)")  # 0.2 s from a standstill hardly verify a pose
 
     def test_the_driver_is_killed_within_a_packet_and_comes_again(self):
         process, driver = self.driven()

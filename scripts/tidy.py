@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs clang-tidy over the sources of a build: scripts/tidy.py BUILD [NAME ...]
+"""Runs clang-tidy over the sources of a preset's build: scripts/tidy.py build/PRESET [NAME ...]
 
-Only files whose path contains one of the NAMEs, each by itself; without any, all of apps and src but the unit tests,
-in batches: most of the time goes into the headers of libraries, which the files of a batch share. Files stand together
-only where the names that they define for themselves allow it, and of a batch with faults the files that these name are
-looked at again one by one.
+Only files whose path contains one of the NAMEs; without any, all of apps and src but the unit tests. In batches: most
+of the time goes into the headers of libraries, which the files of a batch share. Files stand together only where the
+names that they define for themselves allow it, and of a batch with faults the files that these name are looked at again
+one by one.
 What passed is not looked at again until it, what it includes, its flags or .clang-tidy change.
 """
 import concurrent.futures
@@ -31,8 +31,16 @@ DEFINED = re.compile(r"^(?:(?:struct|class|enum class|enum|union|using|namespace
 MACRO = re.compile(r"^#define (\w+)", re.MULTILINE)
 
 
-def sources(build, names):
-    for entry in json.loads((build / "compile_commands.json").read_text()):
+def commands(build):
+    """As each source would be compiled alone, with no header that GCC has precompiled, which clang cannot read."""
+    plain = build / "tidy/plain"
+    subprocess.run(["cmake", "--preset", build.name, "-B", str(plain), "-DEVPOSE_UNITY=OFF", "-DEVPOSE_PRECOMPILED=OFF"],
+                   cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    return json.loads((plain / "compile_commands.json").read_text())
+
+
+def sources(entries, names):
+    for entry in entries:
         path = pathlib.Path(entry["file"])
         inside = any((ROOT / part) in path.parents for part in ("apps", "src")) and path.suffix == ".cpp"
         wanted = any(name in str(path) for name in names) if names else not path.stem.endswith("_test")
@@ -44,11 +52,7 @@ def arguments(entry):
     command = shlex.split(entry["command"])
     if os.path.basename(command[0]) == "ccache":
         command = command[1:]
-    command = command[:command.index("-o")]
-    if "-include" in command:  # headers precompiled by GCC, which clang cannot read
-        at = command.index("-include")
-        del command[at:at + 2]
-    return command
+    return command[:command.index("-o")]
 
 
 def types(names):
@@ -120,9 +124,8 @@ def main():
     passed = build / "tidy"
     passed.mkdir(exist_ok=True)
     start = time.monotonic()
-    entries = list(sources(build, sys.argv[2:]))
-    work = [[entry] for entry in entries] if sys.argv[2:] else batches(entries)
-    work.sort(key=len, reverse=True)
+    entries = list(sources(commands(build), sys.argv[2:]))
+    work = sorted(batches(entries), key=len, reverse=True)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         faults = list(filter(None, pool.map(lambda batch: check(batch, passed), work)))
     print("\n".join(faults))

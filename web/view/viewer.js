@@ -224,6 +224,7 @@ function setFollowing(on) {
 }
 
 function pick(t) {
+  if (rows.length === 0) return; // between a restart and its first rows
   play(false);
   setFollowing(false);
   show(indexAt(t));
@@ -327,6 +328,7 @@ function connect() {
     } else if (message.kind === "restart") {
       rows = [];
       shown = -1;
+      setFollowing(true); // what was looked at has gone
       for (const line of [path, wholePath]) line.geometry.setDrawRange(0, 0);
     } else if (message.kind === "notice") notice(message.words);
   };

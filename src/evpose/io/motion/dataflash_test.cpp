@@ -18,10 +18,7 @@ std::string sample(const std::string& name) { return shared_folder() + "/data/re
 
 std::string bytes_of(const auto& value) { return {reinterpret_cast<const char*>(&value), sizeof value}; }
 
-std::string padded(std::string s, std::size_t size) {
-  s.resize(size, '\0');
-  return s;
-}
+std::string padded(const std::string& s, std::size_t size) { return s + std::string(size - s.size(), '\0'); }
 
 std::string record(int type, const std::string& body) {
   return std::string("\xA3\x95") + static_cast<char>(type) + body;

@@ -30,6 +30,7 @@ constexpr double kFewestPieces = 20, kFewestEvents = 100;
 constexpr double kConfirmedRatio = 2.3;
 constexpr double kConfirmedRatioUnhidden = 1.9;         // contours behind surfaces have no events, but count
 constexpr double kLeastShare = 0.04, kEnoughRatio = 4;  // a few contours that happen to fit do not confirm
+constexpr double kManyPieces = 30, kRatioOfMany = 2.5;  // whatever their share
 constexpr double kConfirmedShare = 0.2, kRatioOfShare = 1.4;  // where texture has events beside them
 constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
 
@@ -167,6 +168,7 @@ PoseVerdict PoseVerifier::verdict() const {
   const PoseEvidence e = evidence();
   if (e.pieces == 0) return PoseVerdict::open;
   if ((e.ratio > confirmed_ratio_ && e.explained > kLeastShare) || e.ratio > kEnoughRatio ||
+      (e.ratio > kRatioOfMany && e.explained * e.pieces > kManyPieces) ||
       (e.explained > kConfirmedShare && e.ratio > kRatioOfShare))
     return PoseVerdict::confirmed;
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs what is missing, builds with warnings as errors and runs the tests. Format, lint, layers, installation,
 # browser and end-to-end checks are tests like all others: what fails is named in the summary at the end.
-# On two cores the first build takes about 15 minutes and all tests about 25, a third of them the first lint.
+# On two cores the first build takes about 10 minutes and all tests about 11, two of them the first lint.
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    the modules' unit tests
 set -euo pipefail

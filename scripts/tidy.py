@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs clang-tidy over the sources of a preset's build: scripts/tidy.py build/PRESET [NAME ...]
 
-Only files whose path contains one of the NAMEs; without any, all of apps and src but the unit tests. In batches: most
-of the time goes into the headers of libraries, which the files of a batch share. Files stand together only where the
-names that they define for themselves allow it, and of a batch with faults the files that these name are looked at again
-one by one.
+Only files whose path contains one of the NAMEs; without any, all of apps and src. Unit tests only by a NAME of theirs.
+In batches: most of the time goes into the headers of libraries, which the files of a batch share. Files stand together
+only where the names that they define for themselves allow it, and of a batch with faults the files that these name are
+looked at again one by one.
 What passed is not looked at again until it, what it includes, its flags or .clang-tidy change.
 """
 import concurrent.futures
@@ -43,7 +43,8 @@ def sources(entries, names):
     for entry in entries:
         path = pathlib.Path(entry["file"])
         inside = any((ROOT / part) in path.parents for part in ("apps", "src")) and path.suffix == ".cpp"
-        wanted = any(name in str(path) for name in names) if names else not path.stem.endswith("_test")
+        tests = any("_test" in name for name in names) or not path.stem.endswith("_test")
+        wanted = tests and (not names or any(name in str(path) for name in names))
         if inside and wanted:
             yield entry
 
@@ -81,9 +82,10 @@ def batches(entries):
     return [group["entries"] for group in groups]
 
 
-def tidy(file, entry):
-    # The flags are those of GCC, some of which clang does not know.
-    return subprocess.run([TOOL, "--quiet", file, "--", *arguments(entry)[1:], "-Wno-unknown-warning-option"],
+def tidy(file, entry, batch):
+    # A batch is a file that includes sources. The flags are those of GCC, some of which clang does not know.
+    checks = ["--checks=-bugprone-suspicious-include"] if batch else []
+    return subprocess.run([TOOL, "--quiet", *checks, file, "--", *arguments(entry)[1:], "-Wno-unknown-warning-option"],
                           cwd=entry["directory"], capture_output=True, text=True)
 
 
@@ -101,7 +103,7 @@ def check(batch, passed):
     if len(batch) > 1:
         file = str(passed / f"{key}.cpp")
         pathlib.Path(file).write_text(text)
-    run = tidy(file, entry)
+    run = tidy(file, entry, len(batch) > 1)
     if len(batch) > 1:
         os.remove(file)
     if run.returncode != 0 and len(batch) > 1:

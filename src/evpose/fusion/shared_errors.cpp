@@ -17,7 +17,7 @@ constexpr double kOfMap = 3;  // the offset of a built map's contours, in sigmas
 constexpr double kClear = 0.6;  // concentration on which the offset was chosen
 constexpr double kLeastConcentration = 0.15;
 
-/// By how much the offset is larger than where few events are of anything but contours.
+/// By how much the offset of a filter's update is larger than where few events are of anything but contours.
 double by_clutter(double concentration) {
   const auto clutter = [](double share) { return (1 - share) / std::max(share, kLeastConcentration); };
   return concentration > 0 ? std::max(1.0, clutter(concentration) / clutter(kClear)) : 1;
@@ -33,8 +33,7 @@ int direction_of(const Eigen::Vector2d& normal_px) {
 
 std::array<SharedErrors::Effect, 2> SharedErrors::on(const ContourOffset& contour) {
   const int side = contour.darker < 0 ? -1 : 1;
-  const double offset_px = by_clutter(contour.concentration) *
-                           std::hypot(kOffset_px, kOfMap * contour.sigma_m * contour.across_body.norm());
+  const double offset_px = std::hypot(kOffset_px, kOfMap * contour.sigma_m * contour.across_body.norm());
   return {
       {{0, kDelay_s * contour.speed_px_s}, {1 + direction_of(side * contour.normal_px), side * offset_px}}};
 }

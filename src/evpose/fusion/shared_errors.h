@@ -16,7 +16,8 @@ struct ContourOffset;
 /// (ErrorStateFilter::follow_shared_errors) and belongs to the pose's covariance.
 ///
 /// Estimated by the filter instead, they and a pose that drifts along its motion confirm each other; over a
-/// whole flight, which sees every direction from many places, they can be told apart.
+/// whole flight, which sees every direction from many places, they can be told apart; there an offset is one
+/// number, which clutter does not change.
 struct SharedErrors {
   static constexpr int kDirections = 8;           ///< of the darker side in the image
   static constexpr int kCount = 1 + kDirections;  ///< the delay, and an offset for each direction
@@ -28,7 +29,7 @@ struct SharedErrors {
   };
   /// On this contour: of the delay, and of the offset of its direction.
   static std::array<Effect, 2> on(const ContourOffset& contour);
-  /// Adds them to this contour's sample.
+  /// Adds them to this contour's sample, the offset larger where many events of the update are of no contour.
   static void add(const ContourOffset& contour, const BlockSample& sample, JointMeasurement& measurement);
 };
 

@@ -11,8 +11,8 @@ namespace evpose::sim {
 
 /// A scene prepared for rendering: ray caster, patches, baked light.
 struct PreparedScene {
-  /// Keeps a reference to the scene.
-  PreparedScene(const Scene& of, ThreadPool& pool);
+  /// Keeps a reference to the scene. `light` of the patches of its still mesh, if it is known.
+  PreparedScene(const Scene& of, ThreadPool& pool, std::vector<LightMap> light = {});
 
   const PartSurfaces& surfaces_of(int part) const { return part < 0 ? still : moving[part]; }
   const Mesh& mesh_of(int part) const { return part < 0 ? scene.mesh : scene.moving[part].mesh; }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <future>
 #include <optional>
 
@@ -19,10 +20,13 @@
 #include "evpose/sim/flight/flight_check.h"
 #include "evpose/sim/light/scene_contours.h"
 #include "evpose/sim/light/scene_view.h"
+#include "evpose/sim/recording/world_cache.h"
 #include "evpose/sim/world/scene_file.h"
 
 namespace evpose::sim {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr const char* kScenarioFile = "scenario.yaml";
 
@@ -119,8 +123,12 @@ bool has_contrast(const RayCaster& rays, const PreparedScene& prepared,
 class RecordingMaker {
  public:
   RecordingMaker(const Scenario& scenario, const NewFolder& folder, int threads,
-                 std::function<void(double)> progress)
-      : scenario_(scenario), folder_(folder), pool_(threads), progress_(std::move(progress)) {}
+                 std::function<void(double)> progress, const std::string& world_cache)
+      : scenario_(scenario),
+        folder_(folder),
+        cache_(world_cache),
+        pool_(threads),
+        progress_(std::move(progress)) {}
 
   Expected<RecordingCounts> make();
 
@@ -128,7 +136,8 @@ class RecordingMaker {
   Status write_motion_and_calibration(const Trajectory& trajectory);
   /// With the errors of `handed_over`, and the truth beside it.
   Status write_calibration(CalibratedCamera truth) const;
-  Status write_map(const Scene& scene, const RayCaster& rays);
+  /// From `known`, or made and kept.
+  Status write_map(const PreparedScene& prepared, const std::optional<WorldCache::World>& known);
   Status expose(const PreparedScene& prepared, const Camera& camera, const std::vector<PixelRay>& rays,
                 const CameraPath& path);
   void report(double fraction) const {
@@ -137,6 +146,7 @@ class RecordingMaker {
 
   const Scenario& scenario_;
   const NewFolder& folder_;
+  WorldCache cache_;
   ThreadPool pool_;
   std::function<void(double)> progress_;
   RecordingCounts counts_;
@@ -188,11 +198,24 @@ Status RecordingMaker::write_calibration(CalibratedCamera truth) const {
   return write_kalibr_camera(handed_over, wrong);
 }
 
-Status RecordingMaker::write_map(const Scene& scene, const RayCaster& rays) {
-  const ContourMap contours = make_contours(scene, rays, scenario_.truth.contour_spacing_m, pool_);
-  counts_.contour_points = contours.points.size();
-  if (Status done = write_ply_contours(folder_.path("contours.ply"), contours); !done) return done;
-  return write_ply_mesh(folder_.path("mesh.ply"), contours.occluders, contours.anchor);
+Status RecordingMaker::write_map(const PreparedScene& prepared,
+                                 const std::optional<WorldCache::World>& known) {
+  WorldCache::World files;
+  files.contours = folder_.path("contours.ply");
+  files.mesh = folder_.path("mesh.ply");
+  if (known) {
+    counts_.contour_points = known->contour_points;
+    std::error_code failed;
+    if (fs::copy_file(known->contours, files.contours, failed) && fs::copy_file(known->mesh, files.mesh, failed))
+      return {};
+    return Error{known->contours, failed.message(), "delete that folder: the world is then made anew"};
+  }
+  const double spacing_m = scenario_.truth.contour_spacing_m;
+  const ContourMap contours = make_contours(prepared.scene, prepared.rays, spacing_m, pool_);
+  counts_.contour_points = files.contour_points = contours.points.size();
+  if (Status done = write_ply_contours(files.contours, contours); !done) return done;
+  if (Status done = write_ply_mesh(files.mesh, contours.occluders, contours.anchor); !done) return done;
+  return cache_.keep(prepared.scene, spacing_m, prepared.still, files);
 }
 
 Status RecordingMaker::expose(const PreparedScene& prepared, const Camera& camera,
@@ -252,14 +275,15 @@ Expected<RecordingCounts> RecordingMaker::make() {
                                  scenario_.integrator.max_flow_px_s);
       !fine)
     return fine.error();
-  const PreparedScene prepared(*scene, pool_);
+  auto known = cache_.find(*scene, scenario_.truth.contour_spacing_m);
+  const PreparedScene prepared(*scene, pool_, known ? std::move(known->light) : std::vector<LightMap>());
   if (!has_contrast(caster, prepared, *rays, path(0).T_map_cam))
     return Error{"scenario", "nothing in view has any contrast at the start",
                  "give the world light (world.lamp_lux, world.sun_lux) and texture (world.texture_contrast)"};
 
   const auto T_map_cam = [&](double t_s) { return path(t_s).T_map_cam; };
   if (Status done = write_motion_and_calibration(*trajectory); !done) return done.error();
-  if (Status done = write_map(*scene, caster); !done) return done.error();
+  if (Status done = write_map(prepared, known); !done) return done.error();
   if (Status done = write_lidar(folder_.path("map_raw.ply"), caster, scenario_.lidar,
                                 static_cast<std::uint64_t>(scenario_.seed), pool_);
       !done)
@@ -275,12 +299,13 @@ Expected<RecordingCounts> RecordingMaker::make() {
 }  // namespace
 
 Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::string& folder, int threads,
-                                         const std::function<void(double)>& progress) {
+                                         const std::function<void(double)>& progress,
+                                         const std::string& world_cache) {
   const auto resolved = with_preset_values(scenario);
   if (!resolved) return resolved.error();
   auto temporary = NewFolder::create(folder, kScenarioFile);
   if (!temporary) return temporary.error();
-  auto counts = RecordingMaker(*resolved, *temporary, threads, progress).make();
+  auto counts = RecordingMaker(*resolved, *temporary, threads, progress, world_cache).make();
   if (!counts) return counts;
   if (Status done = temporary->commit(); !done) return done.error();
   return counts;

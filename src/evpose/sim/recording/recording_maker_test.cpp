@@ -112,6 +112,34 @@ TEST_F(MakeRecording, GivesTheSameBytesForAnyNumberOfThreads) {
     EXPECT_TRUE(a.contains(name)) << name;
 }
 
+TEST_F(MakeRecording, KeptWorldsGiveTheSameBytes) {
+  const std::string worlds = place("worlds");
+  const auto with_cache = [&](const std::string& name) {
+    const auto made = make_recording(scenario_, place(name), 1, {}, worlds);
+    EXPECT_TRUE(made.ok()) << made.error().line();
+    return content(place(name));
+  };
+  const auto kept = [&] { return std::distance(fs::directory_iterator(worlds), fs::directory_iterator()); };
+  ASSERT_TRUE(make("without").ok());
+  const auto without = content(place("without"));
+  EXPECT_EQ(with_cache("first"), without);
+  EXPECT_EQ(with_cache("second"), without);
+  EXPECT_EQ(kept(), 1);
+  // The second one was read, not made: what stands in the folder is what comes out.
+  const fs::path world = fs::directory_iterator(worlds)->path();
+  std::ofstream(world / "contours.ply", std::ios::app) << "kept";
+  EXPECT_EQ(with_cache("third").at("contours.ply"), without.at("contours.ply") + "kept");
+  // Damaged: made anew.
+  fs::resize_file(world / "light.bin", fs::file_size(world / "light.bin") - 1);
+  EXPECT_EQ(with_cache("fourth"), without);
+  // Other light: another world.
+  std::string brighter = kScene;
+  brighter.replace(brighter.find("900"), 3, "950");
+  std::ofstream(folder_ / "scene.yaml") << brighter;
+  EXPECT_NE(with_cache("fifth").at("events.h5"), without.at("events.h5"));
+  EXPECT_EQ(kept(), 2);
+}
+
 TEST_F(MakeRecording, IsARecordingThatTheTrackerReads) {
   const auto made = make("it");
   ASSERT_TRUE(made.ok()) << made.error().line();

@@ -117,7 +117,8 @@ class Bench:
         if not folder.exists():
             folder.parent.mkdir(parents=True, exist_ok=True)
             words = [word for setting in settings for word in ("--set", setting)]
-            self.run("simulate", scenario, "-o", folder, "--duration", seconds, *words)
+            self.run("simulate", scenario, "-o", folder, "--duration", seconds, "--world-cache",
+                     folder.parent / "worlds", *words)
         return Recording(name, folder, folder / "contours.ply", folder / "mesh.ply")
 
     # ---- what was measured

@@ -17,15 +17,15 @@ HEAD = ["recording", "focal %", "centre px", "image px rms", "rotation deg", "pl
 GOAL = ["goal, 10 s", "0.02", "0.1", "0.05", "0.01", "1", "0.1", "0.7 to 1.4", "", ""]
 
 
-def far_start(true, seed):
+def far_start(true, seed, focal=FAR["focal"]):
     """A start that is off: both focal lengths alike, the centre in a direction of its own, no distortion, and of an
     ordinary assembly the camera's pose and time."""
     drawn = random.Random(seed)
     sign = 1 if seed % 2 else -1
     turn = drawn.uniform(0, 2 * math.pi)
     start = {**true, "intrinsics": list(true["intrinsics"]), "distortion": [0.0] * len(true["distortion"])}
-    start["intrinsics"][0] *= 1 + sign * FAR["focal"]
-    start["intrinsics"][1] *= 1 + sign * FAR["focal"]
+    start["intrinsics"][0] *= 1 + sign * focal
+    start["intrinsics"][1] *= 1 + sign * focal
     start["intrinsics"][2] += FAR["centre_px"] * math.cos(turn)
     start["intrinsics"][3] += FAR["centre_px"] * math.sin(turn)
     if "T_cam_imu" in true:

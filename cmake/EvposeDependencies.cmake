@@ -45,6 +45,17 @@ if(EVPOSE_ONLY)
 endif()
 
 find_package(CLI11 REQUIRED)
+# Finds printed boards; without it `evpose calibrate` wants a start pose before them. Debian's CMake files ask for all of
+# OpenCV's libraries.
+find_path(EVPOSE_opencv_INCLUDE opencv2/calib3d.hpp PATH_SUFFIXES opencv4)
+if(EVPOSE_opencv_INCLUDE)
+  add_library(evpose_opencv INTERFACE)
+  target_include_directories(evpose_opencv SYSTEM INTERFACE ${EVPOSE_opencv_INCLUDE})
+  foreach(library calib3d features2d imgproc core)
+    find_library(EVPOSE_opencv_${library}_LIBRARY opencv_${library} REQUIRED)
+    target_link_libraries(evpose_opencv INTERFACE ${EVPOSE_opencv_${library}_LIBRARY})
+  endforeach()
+endif()
 find_package(embree 3.12 REQUIRED)
 find_package(assimp REQUIRED)
 find_package(Boost 1.74 REQUIRED)  # headers alone

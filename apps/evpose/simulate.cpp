@@ -75,8 +75,9 @@ int simulate(const SimulateRequest& request) {
   }
   const auto start = std::chrono::steady_clock::now();
   Progress progress("simulating");
-  const auto made = sim::make_recording(*scenario, request.output, request.threads,
-                                        [&](double share) { progress.at(share); }, request.world_cache);
+  const auto made = sim::make_recording(
+      *scenario, request.output, request.threads, [&](double share) { progress.at(share); },
+      request.world_cache);
   progress.done();
   if (!made) return bad_input(made.error());
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -124,9 +125,10 @@ void add_simulate(CLI::App& app, std::function<int()>& run) {
   command->add_option("--threads", request->threads, "that work; the recording is the same for any number")
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
-  command->add_option("--world-cache", request->world_cache,
-                      "folder in which light and contours of worlds are kept: the next flight through one begins "
-                      "at once");
+  command->add_option(
+      "--world-cache", request->world_cache,
+      "folder in which light and contours of worlds are kept: the next flight through one begins "
+      "at once");
   command->add_flag("--dump-config", request->dump, "print all settings and stop");
   command->callback([=, &run] {
     if (!request->dump && output->count() == 0) throw CLI::RequiredError(output->get_name());

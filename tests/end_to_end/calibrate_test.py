@@ -70,6 +70,40 @@ class CalibrateTest(unittest.TestCase):
         self.assertEqual(known.returncode, 2)
         self.assertIn("all of it is known", known.stderr)
 
+    def test_a_printed_board_needs_no_start_pose(self):
+        hand_held, board = self.root / "hand_held", self.root / "board.h5"
+        made = self.evpose("simulate", SCENARIO.with_name("board.yaml"), "-o", hand_held, "--duration", 3,
+                           *(word for setting in TINY for word in ("--set", setting)))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertEqual(self.evpose("map", "board", "--checkerboard", "9x7", "--square", 0.08, "-o", board).returncode, 0)
+        truth = (hand_held / "camchain-imucam.yaml").read_text()
+        for name in ("groundtruth.tum", "groundtruth_camera.tum", "contours.ply"):
+            (hand_held / name).unlink()
+        fx, fy, cx, cy = numbers(truth, "intrinsics")
+        start = self.root / "start.yaml"
+        start.write_text(re.sub(r".*_sigma: .*\n", "", re.sub(
+            r"distortion_coeffs: \[.*\]", "distortion_coeffs: [0, 0, 0, 0]", re.sub(
+                r"intrinsics: \[.*\]", f"intrinsics: [{1.1 * fx}, {1.1 * fy}, {cx + 10}, {cy - 10}]", truth))))
+        words = ("calibrate", hand_held, "--map", board, "--start", start, "-o", self.root / "found.yaml")
+        done = self.evpose(*words)
+        if "without OpenCV" in done.stderr:
+            self.skipTest(done.stderr.strip())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("warning", done.stderr)
+        chain = (self.root / "found.yaml").read_text()
+        for key in ("intrinsics", "distortion_coeffs"):
+            sigmas = numbers(chain, key.replace("_coeffs", "") + "_sigma")
+            for found, sigma, number in zip(numbers(chain, key), sigmas, numbers(truth, key)):
+                self.assertLess(abs(found - number), 4 * sigma)
+        self.assertLess(abs(numbers(chain, "intrinsics")[0] / fx - 1), 0.005)
+        hall = self.root / "hall"
+        self.assertEqual(self.evpose("simulate", SCENARIO, "-o", hall, "--duration", 0.5,
+                                     *(word for setting in TINY for word in ("--set", setting))).returncode, 0)
+        none = self.evpose("calibrate", hall, "--map", board, "--start", start, "-o", self.root / "none.yaml")
+        self.assertEqual(none.returncode, 2)
+        self.assertIn("the board is never seen whole", none.stderr)
+        self.assertEqual(len(none.stderr.strip().splitlines()), 1, none.stderr)
+
     def test_what_a_short_slide_does_not_tell_is_said(self):
         done = self.calibrate(Recording().write(self.root / "recording"), CALIBRATION)
         self.assertIn(done.returncode, (0, 1), done.stderr)

@@ -68,6 +68,7 @@ OUTSIDE = [
     ("Embree", r"embree3/", {"sim"}),
     ("assimp", r"assimp/", {"sim"}),
     ("Boost", r"boost/", {"view"}),
+    ("OpenCV", r"opencv2/", {"calibrate"}),
     ("CLI11", r"CLI/", {"apps"}),
 ]
 # Opening files and printing.

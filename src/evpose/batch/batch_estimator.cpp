@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "evpose/batch/following_back_end.h"
+#include "evpose/fusion/calibration_states.h"
 #include "evpose/tracker/map_pager.h"
 
 namespace evpose {
@@ -111,8 +112,7 @@ TrackJob BatchEstimator::at_present_values() const {
   out.setup.T_body_cam = {found.turn * job_.setup.T_body_cam.q, job_.setup.T_body_cam.p + found.shift};
   out.recording.event_options.offset_ns += from_seconds(found.time_offset_s);
   FusionConfig& fusion = out.config.tracker.fusion;
-  const Eigen::Vector2d& tilt = found.gravity_tilt_rad;
-  fusion.gravity_map = so3::exp({tilt.x(), tilt.y(), 0}) * fusion.gravity_map;
+  fusion.gravity_map = so3::exp(tilt_axes(fusion.gravity_map) * found.gravity_tilt_rad) * fusion.gravity_map;
   if (parameters_->places().intrinsics) {
     out.setup.intrinsics = corrected(*job_.setup.intrinsics, found.intrinsics);
     if (auto camera = make_camera(*out.setup.intrinsics)) out.setup.camera = *camera;
@@ -126,6 +126,10 @@ Expected<std::unique_ptr<Tracker>> BatchEstimator::follow(const Progress& progre
   followed_ = job.setup;
   TrackerConfig config = job.config.tracker;
   config.relocalization.on = false;
+  config.fusion.start_position_sigma_m =
+      std::max(config.fusion.start_position_sigma_m, of_passes_.position_m);
+  config.fusion.start_rotation_sigma_rad =
+      std::max(config.fusion.start_rotation_sigma_rad, of_passes_.rotation_rad);
   config.event_registration.correlation_time_s *= kLongerCorrelation;
   const auto make = [&](const FusionConfig& fusion) {
     auto back_end =

@@ -23,6 +23,17 @@ class BatchEstimator {
   explicit BatchEstimator(TrackJob job, std::shared_ptr<StaticParameters> parameters = nullptr)
       : job_(std::move(job)), parameters_(std::move(parameters)) {}
 
+  /// 1 sigma along and about each axis.
+  struct StartSigma {
+    double position_m = 0, rotation_rad = 0;
+  };
+  /// Begins there instead of at the job's start. `of_passes`: how far the passes may move the start, at
+  /// least; the filter takes the start for as good as configured.
+  void begin_at(const StartState& start, const StartSigma& of_passes) {
+    job_.start = start;
+    of_passes_ = of_passes;
+  }
+
   /// What is told the share of a pass, 0..1, and ends it by false.
   using Progress = std::function<bool(double)>;
 
@@ -65,6 +76,7 @@ class BatchEstimator {
   ChainSmoother chain_;
   RunSummary summary_;
   std::shared_ptr<StaticParameters> parameters_;  ///< after the filter's run
+  StartSigma of_passes_;
   ContourCallback contour_callback_;
   TrackerSetup followed_;
   bool interrupted_ = false;

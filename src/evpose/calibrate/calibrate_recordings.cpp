@@ -3,20 +3,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <utility>
 
+#include "evpose/calibrate/board_start.h"
 #include "evpose/calibrate/calibration_words.h"
 #include "evpose/calibrate/data_sheet.h"
 #include "evpose/calibrate/joint_calibration.h"
 #include "evpose/core/log.h"
 #include "evpose/io/calibration/kalibr.h"
 #include "evpose/io/files/atomic_file.h"
+#include "evpose/io/maps/map_h5.h"
 #include "evpose/run/progress.h"
 
 namespace evpose {
 namespace {
 
+constexpr double kBoardSigmas = 3;  // events are offset from a board's points by more than these scatter
+constexpr double kBoardVelocity_m_s = 0.1, kBoardRate_rad_s = 0.1;  // mean over 0.2 s
+constexpr double kBoardGravity_rad = 0.02;
 constexpr double kRefuted = 5;  // given sigmas by which the events may contradict what was given
 
 bool is_known(const CalibrationSigma& sigma, const Recording& recording) {
@@ -45,25 +51,93 @@ Expected<TrackJob> job_of(const TrackRequest& request, const RunConfig& config) 
   return job;
 }
 
-/// One job a recording, all with the calibration of the request or else of the first recording.
-Expected<std::vector<TrackJob>> jobs_of(const CalibrateRequest& request) {
+/// Of the recordings, all with the calibration of the request or else of the first one.
+Expected<std::vector<Recording>> open_all(const CalibrateRequest& request, std::string* calibration) {
+  *calibration = request.track.calibration;
+  std::vector<Recording> out;
+  for (const std::string& path : request.recordings) {
+    auto recording = open_recording(path, *calibration);
+    if (!recording) return recording.error();
+    if (calibration->empty()) *calibration = recording->calibration_path;
+    if (!out.empty() && recording->has_imu != out.front().has_imu)
+      return Error{path, "has an IMU and the first recording has none, or the other way round",
+                   "calibrate recordings of one kind together"};
+    out.push_back(std::move(*recording));
+  }
+  return out;
+}
+
+/// The printed board that is the map; none if it is another map, or the request says where to start.
+Expected<std::optional<Board>> board_to_find(const TrackRequest& request, const Recording& recording) {
+  if (request.init != "auto") return std::optional<Board>();
+  const auto path = map_path(request, recording);
+  if (!path) return path.error();
+  const auto words = read_map_board(*path);
+  return words ? Expected(read_board_words(*words)) : words.error();
+}
+
+/// As --init has it.
+std::string init_words(const StartState& start) {
+  const Pose& T = start.T_map_body;
+  char words[256];
+  std::snprintf(words, sizeof words, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g@%.9f", T.p.x(), T.p.y(),
+                T.p.z(), T.q.x(), T.q.y(), T.q.z(), T.q.w(), to_seconds(start.t));
+  return words;
+}
+
+/// What there is to do, and what a board has told.
+struct Work {
+  std::vector<TrackJob> jobs;
+  std::optional<BoardBeginning> board;
+};
+
+/// None where `progress` ends it.
+Expected<std::optional<Work>> work_of(const CalibrateRequest& request,
+                                      const std::function<bool(double)>& progress) {
   TrackRequest one = request.track;
   const auto config = load_config(one);
   if (!config) return config.error();
   if (!config->tracker.fusion.calibration.on)
     return Error{"fusion.calibration.on", "is false: nothing would be calibrated", "leave it out"};
-  std::vector<TrackJob> jobs;
-  for (const std::string& recording : request.recordings) {
-    one.recording = recording;
+  const auto recordings = open_all(request, &one.calibration);
+  if (!recordings) return recordings.error();
+  const auto board = board_to_find(one, recordings->front());
+  if (!board) return board.error();
+  Work out;
+  std::optional<BoardStart> found;
+  if (*board) {
+    const CameraIntrinsics given = with_distortion(recordings->front().camera);
+    auto start = find_board_start(*recordings, **board, given,
+                                  data_sheet_sigma(recordings->front().calibration_sigma, given), progress);
+    if (!start) return start.error();
+    if (!*start) return std::optional<Work>();
+    found = std::move(*start);
+    const Eigen::VectorXd known =
+        data_sheet_sigma(recordings->front().calibration_sigma, given).of_intrinsics(given);
+    out.board =
+        BoardBeginning{found->correction, known.cwiseMin(kBoardSigmas * found->sigma), found->sightings};
+  }
+  for (std::size_t k = 0; k < recordings->size(); ++k) {
+    one.recording = request.recordings[k];
+    if (found) one.init = init_words(found->starts[k]);
     auto job = job_of(one, *config);
     if (!job) return job.error();
-    if (one.calibration.empty()) one.calibration = job->recording.calibration_path;
-    if (!jobs.empty() && job->recording.has_imu != jobs.front().recording.has_imu)
-      return Error{recording, "has an IMU and the first recording has none, or the other way round",
-                   "calibrate recordings of one kind together"};
-    jobs.push_back(std::move(*job));
+    if (found) {
+      job->start = found->starts[k];
+      FusionConfig& fusion = job->config.tracker.fusion;
+      if (found->sightings[k].tells_velocity()) {
+        fusion.start_velocity_sigma_m_s = kBoardVelocity_m_s;
+        fusion.start_angular_rate_sigma_rad_s = kBoardRate_rad_s;
+      }
+      if (found->gravity) {
+        fusion.gravity_map = *found->gravity;
+        fusion.calibration.gravity = true;
+        fusion.calibration.start_gravity_sigma_rad = kBoardGravity_rad;
+      }
+    }
+    out.jobs.push_back(std::move(*job));
   }
-  return jobs;
+  return std::optional(std::move(out));
 }
 
 FlightMotion motion_of(const JointCalibration& joint, std::size_t k) {
@@ -130,9 +204,9 @@ struct Estimate {
   RunCalibration calibration;
 };
 
-Expected<Estimate> estimate(std::vector<TrackJob> jobs, const TrackRequest& request,
+Expected<Estimate> estimate(Work work, const TrackRequest& request,
                             const JointCalibration::Progress& progress) {
-  Estimate out{std::make_unique<JointCalibration>(std::move(jobs)), {}};
+  Estimate out{std::make_unique<JointCalibration>(std::move(work.jobs), std::move(work.board)), {}};
   if (auto ok = out.joint->estimate(request, progress); !ok) return ok.error();
   if (out.joint->interrupted()) return out;
   const auto found = run_calibration(out.joint->job(0), out.joint->found());
@@ -143,12 +217,12 @@ Expected<Estimate> estimate(std::vector<TrackJob> jobs, const TrackRequest& requ
 }
 
 /// Again, as if the calibration's sigmas had not been stated.
-std::vector<TrackJob> without_stated_sigmas(std::vector<TrackJob> jobs) {
-  for (TrackJob& job : jobs) {
+Work without_stated_sigmas(Work work) {
+  for (TrackJob& job : work.jobs) {
     job.recording.calibration_sigma = only_data_sheet(job.recording.calibration_sigma, job.recording.camera);
     job.setup.calibration_sigma = job.recording.calibration_sigma;
   }
-  return jobs;
+  return work;
 }
 
 std::string report_path(const std::string& chain) {
@@ -166,20 +240,28 @@ Status check_output(const TrackRequest& request) {
 
 Expected<std::optional<CalibrateOutcome>> calibrate_recordings(const CalibrateRequest& request) {
   if (auto ok = check_output(request.track); !ok) return ok.error();
-  const auto jobs = jobs_of(request);
-  if (!jobs) return jobs.error();
-  for (const TrackJob& job : *jobs)
+  const auto told = [&](Progress& shown) {
+    return [&](double share) {
+      shown.at(share);
+      return !(request.track.interrupted && request.track.interrupted());
+    };
+  };
+  Progress looking("looking for the board");
+  const auto planned = work_of(request, told(looking));
+  looking.done();
+  if (!planned) return planned.error();
+  if (!*planned) return std::optional<CalibrateOutcome>();
+  const Work& work = **planned;
+  for (const TrackJob& job : work.jobs)
     for (const Error& finding : job.findings) log_warning(finding.line());
   Progress shown("calibrating");
-  const auto progress = [&](double share) {
-    shown.at(share);
-    return !(request.track.interrupted && request.track.interrupted());
-  };
-  auto found = estimate(*jobs, request.track, progress);
+  const auto progress = told(shown);
+  auto found = estimate(work, request.track, progress);
   if (found && found->joint->interrupted()) return std::optional<CalibrateOutcome>();
-  const CalibrationSigma& stated = jobs->front().recording.calibration_sigma;
-  const bool narrow = stated.intrinsics &&
-                      only_data_sheet(stated, jobs->front().recording.camera).intrinsics != stated.intrinsics;
+  const Recording& first = work.jobs.front().recording;
+  const CalibrationSigma& stated = first.calibration_sigma;
+  const bool narrow =
+      stated.intrinsics && only_data_sheet(stated, first.camera).intrinsics != stated.intrinsics;
   std::string refuted;
   if (narrow && found) refuted = refuted_words(*found->joint, numbers_of(found->calibration));
   if (narrow && !found)
@@ -187,7 +269,7 @@ Expected<std::optional<CalibrateOutcome>> calibrate_recordings(const CalibrateRe
         "the contours are nowhere near where the given calibration and its sigmas have them; it was taken "
         "for a data sheet's";
   if (!refuted.empty()) {
-    found = estimate(without_stated_sigmas(*jobs), request.track, progress);
+    found = estimate(without_stated_sigmas(work), request.track, progress);
     if (found && found->joint->interrupted()) return std::optional<CalibrateOutcome>();
   }
   if (!found) return found.error();

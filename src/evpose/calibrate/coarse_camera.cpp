@@ -18,6 +18,17 @@
 #include "evpose/registration/pose_search.h"
 
 namespace evpose {
+
+Calibration given_calibration(const TrackJob& job) {
+  const CalibrationSigma& stated = *job.setup.calibration_sigma;
+  Calibration out;
+  out.intrinsics_sigma = stated.of_intrinsics(*job.setup.intrinsics);
+  out.intrinsics.setZero(out.intrinsics_sigma.size());
+  out.turn_sigma_rad = stated.of_rotation_rad();
+  out.shift_sigma_m = stated.of_translation_m();
+  return out;
+}
+
 namespace {
 
 constexpr double kBridged_px = 4;  // that the alignment of the start bridges: its first gate
@@ -188,16 +199,6 @@ std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const
     };
     if (out.size() < kKept && std::ranges::none_of(out, near)) out.push_back(t);
   }
-  return out;
-}
-
-Calibration given_calibration(const TrackJob& job) {
-  const CalibrationSigma& stated = *job.setup.calibration_sigma;
-  Calibration out;
-  out.intrinsics_sigma = stated.of_intrinsics(*job.setup.intrinsics);
-  out.intrinsics.setZero(out.intrinsics_sigma.size());
-  out.turn_sigma_rad = stated.of_rotation_rad();
-  out.shift_sigma_m = stated.of_translation_m();
   return out;
 }
 

@@ -6,6 +6,9 @@
 
 namespace evpose {
 
+/// What the job is told of its calibration, with sigmas: no differences yet.
+Calibration given_calibration(const TrackJob& job);
+
 /// A camera that is known as a data sheet knows it, to within the few pixels that the tracker's alignment of
 /// the start can bridge: over what the calibration's sigmas allow, that one with which the contours meet most
 /// edges in slices of events of the first tenths of a second. A grid of focal lengths, principal points and

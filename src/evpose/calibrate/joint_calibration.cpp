@@ -14,15 +14,21 @@ namespace evpose {
 namespace {
 
 constexpr int kFilterRuns = 2;  // of the first recording: the second from what the first has found
-constexpr int kMostPasses = 12;
+constexpr int kMostFilterRuns = 4;
+constexpr double kGoodRun = 0.8;  // share of accepted updates with which another run begins no better
+constexpr int kMostPasses = 24;
 // Share of what is measured that counts: what contours are off by lasts as long as they are in view, which
 // adds up over a flight in what does not change and hardly in its poses. docs/decisions/fusion.md has the
 // figures.
 constexpr double kIndependent = 0.5;
 constexpr double kStill = 0.1;  // change of a pass, in sigma, that is not worth another
-constexpr double kTakenBack = 0.3, kShorter = 0.5, kLeastStep = 0.25;  // of steps that overshoot
+// Steps that overshoot become shorter, those that go on in one direction longer again.
+constexpr double kTakenBack = 0.3, kGoesOn = 0.5, kShorter = 0.5, kLeastStep = 0.25;
 constexpr double kLeastAccepted = 0.2;  // share of the updates: below it, it is another view that was found
 constexpr double kUnknown = 1e-4;       // trust in what was given, where the events shall speak alone
+// Of a start before a board: a focal length that is off moves the camera along its axis, a principal point
+// turns it.
+constexpr double kBoardPosition_m = 0.15, kBoardRotation_rad = 0.05;
 constexpr double kSteps = kFilterRuns + kMostPasses;
 
 double share_of_accepted(std::span<const Update> updates) {
@@ -50,8 +56,8 @@ std::string reason_of(std::span<const Update> updates) {
 
 }  // namespace
 
-JointCalibration::JointCalibration(std::vector<TrackJob> jobs)
-    : jobs_(std::move(jobs)), residuals_(jobs_.front().setup.camera->size()) {}
+JointCalibration::JointCalibration(std::vector<TrackJob> jobs, std::optional<BoardBeginning> board)
+    : jobs_(std::move(jobs)), board_(std::move(board)), residuals_(jobs_.front().setup.camera->size()) {}
 
 bool JointCalibration::go_on(const Progress& progress, double share) {
   const double of = kSteps * static_cast<double>(jobs_.size());
@@ -74,8 +80,12 @@ Status JointCalibration::begin_parameters() {
   auto fusion = resolved(job.config.tracker.fusion, states_errors(*job.map));
   if (!fusion) return fusion.error();
   choose_states(job.setup, *fusion);
-  const auto coarse = coarse_camera(job, *fusion);
+  auto coarse = board_ ? Expected(given_calibration(job)) : coarse_camera(job, *fusion);
   if (!coarse) return coarse.error();
+  if (board_) {
+    coarse->intrinsics = board_->intrinsics;
+    coarse->intrinsics_sigma = board_->intrinsics_sigma;
+  }
   parameters_ = std::make_shared<StaticParameters>(*fusion, StaticParameters::Shared::estimated);
   parameters_->add(*coarse);
   log_detail(text("coarse: ", values_words(*parameters_)));
@@ -106,13 +116,23 @@ Status JointCalibration::look_along_flight(const TrackRequest& request,
   return {};
 }
 
+/// The board fixes where the camera is seen from, so a start goes with the calibration it is seen with.
+void JointCalibration::begin_before_board(BatchEstimator& flight, const BoardSighting& sighting) const {
+  const TrackerSetup setup = flight.at_present_values().setup;
+  if (const auto start = sighting.start(*setup.camera, setup.T_body_cam.inverse()))
+    flight.begin_at(*start, {kBoardPosition_m, kBoardRotation_rad});
+}
+
 /// The trajectories to begin with.
 Status JointCalibration::begin(const TrackRequest& request, const Progress& progress) {
   if (auto ok = begin_parameters(); !ok) return ok;
   for (std::size_t k = 0; k < jobs_.size(); ++k) {
     flights_.push_back(std::make_unique<BatchEstimator>(jobs_[k], parameters_));
     BatchEstimator& flight = *flights_.back();
-    for (int run = 0; run < (k == 0 ? kFilterRuns : 1); ++run) {
+    const int runs = k == 0 ? kFilterRuns : 1;
+    const auto runs_well = [&] { return accepted_share(k) >= kGoodRun; };
+    for (int run = 0; run < runs || (board_ && run < kMostFilterRuns && !runs_well()); ++run) {
+      if (board_) begin_before_board(flight, board_->sightings[k]);
       const auto told = [&](double share) { return go_on(progress, share); };
       if (auto ok = flight.filter(request, told); !ok) return ok;
       if (interrupted_) return {};
@@ -120,9 +140,11 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
                       values_words(*parameters_)));
       ++done_;
       if (!std::ranges::any_of(flight.updates(), &Update::accepted))
-        return Error{jobs_[k].recording.folder, "the events never gathered at the map's contours",
-                     "check the start pose, the map and the focal length"};
-      if (k == 0 && run == 0)
+        return Error{
+            jobs_[k].recording.folder,
+            text("the events never gathered at the map's contours (", reason_of(flight.updates()), ")"),
+            "check the start pose, the map and the focal length"};
+      if (k == 0 && run == 0 && !board_)
         if (auto ok = look_along_flight(request, told); !ok || interrupted_) return ok;
     }
     flight_residuals_.emplace_back(residuals_);
@@ -162,14 +184,16 @@ Expected<double> JointCalibration::pass(const Progress& progress) {
   return change;
 }
 
-/// A step that takes back much of the last one has gone too far, and so had that: half of it, from then on.
+/// A step that takes back much of the last one has gone too far, and so had that: half of it, from then on;
+/// one that goes on where the last one went had been too short.
 double JointCalibration::share_of_step(const ParameterSolution& solution) {
   const Eigen::Index n = parameters_->calibration_size();
   const Eigen::VectorXd step = solution.z.head(n);
   if (last_step_.size() == n) {
     const Eigen::VectorXd weighted = solution.covariance.topLeftCorner(n, n).ldlt().solve(last_step_);
-    if (step.dot(weighted) < -kTakenBack * last_step_.dot(weighted))
-      step_share_ = std::max(kLeastStep, kShorter * step_share_);
+    const double along = step.dot(weighted) / last_step_.dot(weighted);
+    if (along < -kTakenBack) step_share_ = std::max(kLeastStep, kShorter * step_share_);
+    if (along > kGoesOn) step_share_ = std::min(1.0, step_share_ / kShorter);
   }
   last_step_ = step_share_ * step;
   return step_share_;

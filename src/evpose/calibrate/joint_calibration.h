@@ -3,20 +3,28 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "evpose/batch/batch_estimator.h"
+#include "evpose/calibrate/board_start.h"
 #include "evpose/calibrate/residual_field.h"
 
 namespace evpose {
+
+/// What pictures of a printed board tell before anything is tracked.
+struct BoardBeginning {
+  Eigen::VectorXd intrinsics, intrinsics_sigma;  ///< differences from what was given
+  std::vector<BoardSighting> sightings;          ///< of each recording
+};
 
 /// One calibration from several recordings of the same camera and IMU, before the same map: what does not
 /// change is estimated from all of them together with the trajectory of each.
 class JointCalibration {
  public:
   /// All jobs have the same calibration given.
-  explicit JointCalibration(std::vector<TrackJob> jobs);
+  explicit JointCalibration(std::vector<TrackJob> jobs, std::optional<BoardBeginning> board = {});
 
   /// Told the share of the work, 0..1; false ends it.
   using Progress = std::function<bool(double)>;
@@ -48,6 +56,7 @@ class JointCalibration {
  private:
   Status begin_parameters();
   Status look_along_flight(const TrackRequest& request, const std::function<bool(double)>& progress);
+  void begin_before_board(BatchEstimator& flight, const BoardSighting& sighting) const;
   Status begin(const TrackRequest& request, const Progress& progress);
   Expected<double> pass(const Progress& progress);
   double share_of_step(const ParameterSolution& solution);
@@ -55,6 +64,7 @@ class JointCalibration {
   bool go_on(const Progress& progress, double share);
 
   std::vector<TrackJob> jobs_;
+  std::optional<BoardBeginning> board_;
   std::vector<std::unique_ptr<BatchEstimator>> flights_;
   std::shared_ptr<StaticParameters> parameters_;
   std::vector<ResidualField> flight_residuals_;

@@ -33,8 +33,16 @@ Eigen::Matrix<double, 6, 3> seen_pose_by_translation(const FusionState& state) {
   return out;
 }
 
+Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity_map) {
+  Eigen::Index up = 0;
+  gravity_map.cwiseAbs().maxCoeff(&up);
+  Eigen::Matrix<double, 3, 2> out;
+  out << Eigen::Vector3d::Unit(up == 0 ? 1 : 0), Eigen::Vector3d::Unit(up == 2 ? 1 : 2);
+  return out;
+}
+
 Eigen::Matrix<double, 15, 2> state_by_gravity_tilt(const Eigen::Vector3d& gravity_map, double dt_s) {
-  const Eigen::Matrix<double, 3, 2> by_tilt = -so3::hat(gravity_map).leftCols<2>();
+  const Eigen::Matrix<double, 3, 2> by_tilt = -so3::hat(gravity_map) * tilt_axes(gravity_map);
   Eigen::Matrix<double, 15, 2> out = Eigen::Matrix<double, 15, 2>::Zero();
   out.middleRows<3>(error_state::kV) = dt_s * by_tilt;
   out.middleRows<3>(error_state::kP) = 0.5 * dt_s * dt_s * by_tilt;
@@ -134,7 +142,7 @@ void CalibrationStates::apply_corrections(const ErrorStateFilter& filter, Eigen:
   if (gravity_) {
     const Eigen::Vector2d tilt = filter.correction(*gravity_);
     found_.gravity_tilt_rad += tilt;
-    *gravity_map = so3::exp({tilt.x(), tilt.y(), 0}) * *gravity_map;
+    *gravity_map = so3::exp(tilt_axes(*gravity_map) * tilt) * *gravity_map;
   }
   state_sigmas(filter);
 }

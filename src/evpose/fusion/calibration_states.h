@@ -15,7 +15,11 @@ Vector6d seen_pose_by_time_offset(const FusionState& state);
 Eigen::Matrix<double, 6, 3> seen_pose_by_rotation(const FusionState& state,
                                                   const Eigen::Vector3d& p_body_cam);
 Eigen::Matrix<double, 6, 3> seen_pose_by_translation(const FusionState& state);
-/// Within `dt_s`, by gravity's tilt about the map's x and y.
+/// About which gravity's tilt is told: the two axes of the map that are farther from it, x and y where z is
+/// up.
+Eigen::Matrix<double, 3, 2> tilt_axes(const Eigen::Vector3d& gravity_map);
+
+/// Within `dt_s`, by gravity's tilt about tilt_axes().
 Eigen::Matrix<double, 15, 2> state_by_gravity_tilt(const Eigen::Vector3d& gravity_map, double dt_s);
 
 /// The calibration as blocks of a filter: time offset between IMU and camera, rotation and translation of the

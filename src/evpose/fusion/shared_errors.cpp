@@ -40,7 +40,9 @@ std::array<SharedErrors::Effect, 2> SharedErrors::on(const ContourOffset& contou
 
 void SharedErrors::add(const ContourOffset& contour, const BlockSample& sample,
                        JointMeasurement& measurement) {
-  for (const auto& [number, px] : on(contour)) measurement.add_shared_error(number, px, sample);
+  const auto [delay, offset] = on(contour);
+  measurement.add_shared_error(delay.number, delay.px, sample);
+  measurement.add_shared_error(offset.number, by_clutter(contour.concentration) * offset.px, sample);
 }
 
 }  // namespace evpose

@@ -89,6 +89,7 @@ struct ContourMap {
   std::vector<std::uint32_t> numbers;  ///< of the points in the map that this is a part of, ascending; empty:
                                        ///< it is a whole
   std::string frame = "map";           ///< name of the map frame
+  std::string board;                   ///< board_words() of the printed board that it is; empty: it is none
   std::string source;                  ///< file it was read from, for messages
 
   Eigen::Vector3d position(std::size_t i) const { return anchor + points[i].position.cast<double>(); }

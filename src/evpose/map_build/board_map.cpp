@@ -149,7 +149,9 @@ const char *const kHalfTurn = "turned by 180 degrees", *const kQuarterTurn = "tu
 }  // namespace
 
 Expected<ContourMap> board_map(const Board& board) {
-  return std::visit([](const auto& b) { return map_of(b); }, board);
+  auto map = std::visit([](const auto& b) { return map_of(b); }, board);
+  if (map) map->board = board_words(board);
+  return map;
 }
 
 std::string board_symmetry(const Board& board) {

@@ -35,7 +35,7 @@ double rounded(double value) { return std::round(10 * value) / 10; }
 }  // namespace
 
 std::optional<Error> doubt_map_size(const ContourMap& map) {
-  if (map.points.empty()) return {};
+  if (map.points.empty() || !map.board.empty()) return {};
   const Box box = box_of(map);
   const double extent_m = (box.high - box.low).maxCoeff();
   if (extent_m > kLargest_m)

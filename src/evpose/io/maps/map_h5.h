@@ -27,6 +27,9 @@ struct MapPlacement {
 /// T_ned_map is no rigid transform, origin_llh no place on earth.
 Expected<MapPlacement> read_map_placement(const std::string& path);
 
+/// ContourMap::board of that file; empty for what is no map file.
+Expected<std::string> read_map_board(const std::string& path);
+
 /// Contours are numbered anew, in the order of their first points; points of one contour that differ in kind,
 /// planes or contrast become several. The mesh of occluders is written unless there are polygons to make it
 /// of. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes.

@@ -273,6 +273,7 @@ Status Writer::meta(const ContourMap& map, const std::string& created_utc, const
        created_utc.empty() ? Status() : file_.set_attribute("/meta", "created_utc", created_utc),
        file_.set_attribute("/meta", "units", std::string("m")),
        file_.set_attribute("/meta", "frame", map.frame),
+       map.board.empty() ? Status() : file_.set_attribute("/meta", "board", map.board),
        file_.set_attribute("/meta", "anchor", NumberType::f64, {3}, map.anchor.data()),
        file_.set_attribute("/meta", "T_ned_map", NumberType::f64, {4, 4}, T_ned_map.data()),
        placement.origin_llh

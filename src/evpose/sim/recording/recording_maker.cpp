@@ -206,7 +206,8 @@ Status RecordingMaker::write_map(const PreparedScene& prepared,
   if (known) {
     counts_.contour_points = known->contour_points;
     std::error_code failed;
-    if (fs::copy_file(known->contours, files.contours, failed) && fs::copy_file(known->mesh, files.mesh, failed))
+    if (fs::copy_file(known->contours, files.contours, failed) &&
+        fs::copy_file(known->mesh, files.mesh, failed))
       return {};
     return Error{known->contours, failed.message(), "delete that folder: the world is then made anew"};
   }

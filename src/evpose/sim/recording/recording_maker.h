@@ -27,9 +27,9 @@ struct RecordingCounts {
 /// scene), scenario.yaml (every setting), and, where the scenario enables them, frames/, depth/, map_raw.ply,
 /// events_truth.h5, and camchain-imucam_truth.yaml and handed_over.yaml beside a calibration with errors. The
 /// folder appears when it is complete; the result of an earlier run is replaced. The same scenario gives the
-/// same bytes, for any number of threads, and whether its world is in the folder `world_cache` (WorldCache) or
-/// not. `progress` is called with the completed fraction. Errors: what is wrong with the scenario; a folder that
-/// cannot be written.
+/// same bytes, for any number of threads, and whether its world is in the folder `world_cache` (WorldCache)
+/// or not. `progress` is called with the completed fraction. Errors: what is wrong with the scenario; a
+/// folder that cannot be written.
 Expected<RecordingCounts> make_recording(const Scenario& scenario, const std::string& folder, int threads,
                                          const std::function<void(double fraction)>& progress,
                                          const std::string& world_cache = {});

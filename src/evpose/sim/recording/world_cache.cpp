@@ -201,7 +201,8 @@ Status WorldCache::keep(const Scene& scene, double contour_spacing_m, const Part
   for (const auto& [from, name] : {std::pair(&files.contours, kContours), {&files.mesh, kMesh}}) {
     std::error_code failed;
     fs::copy_file(*from, folder->path(name), failed);
-    if (failed) return Error{folder_, failed.message(), "name a folder with room, or leave out --world-cache"};
+    if (failed)
+      return Error{folder_, failed.message(), "name a folder with room, or leave out --world-cache"};
   }
   if (auto done = write_light(folder->path(kLight), head, still); !done) return done;
   return folder->commit();

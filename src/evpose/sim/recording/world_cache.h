@@ -11,8 +11,8 @@
 
 namespace evpose::sim {
 
-/// Worlds that were made before: the light on their still surfaces and their true contours, which cost as much
-/// as some tenths of a second of flight. A world is known by all that these are made of (mesh, lights,
+/// Worlds that were made before: the light on their still surfaces and their true contours, which cost as
+/// much as some tenths of a second of flight. A world is known by all that these are made of (mesh, lights,
 /// spacing of the contours) and by the program that made them: another build makes it anew.
 class WorldCache {
  public:

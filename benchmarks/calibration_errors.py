@@ -15,7 +15,7 @@ def parse(text):
         out |= {"T_cam_imu": np.array(cam["T_cam_imu"], dtype=float), "time_s": float(cam.get("timeshift_cam_imu", 0.0))}
     if "calibration_correlation" in cam:
         sigma = cam["intrinsics_sigma"] + cam["distortion_sigma"]
-        if "T_cam_imu_sigma" in cam:
+        if "T_cam_imu" in cam:
             turn, shift = cam["T_cam_imu_sigma"][:3], cam["T_cam_imu_sigma"][3:]
             sigma = [*sigma, *np.radians(turn), *shift, cam["timeshift_sigma"]]
         sigma = np.array(sigma, dtype=float)

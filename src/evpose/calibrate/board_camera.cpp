@@ -40,9 +40,9 @@ struct NormalEquations {
 
 class BoardAdjustment {
  public:
-  BoardAdjustment(std::shared_ptr<AdjustedCamera> camera, const Eigen::MatrixXd& covariance,
+  BoardAdjustment(const CameraIntrinsics& given, const Eigen::MatrixXd& covariance,
                   const BoardLattice& lattice, std::vector<BoardView>* views)
-      : camera_(std::move(camera)),
+      : given_(given),
         prior_(covariance.ldlt().solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()))),
         lattice_(lattice),
         views_(*views),
@@ -83,11 +83,13 @@ class BoardAdjustment {
       const std::vector<BoardView> kept = views_;
       const Eigen::VectorXd kept_numbers = numbers_;
       NormalEquations next;
-      if (step.allFinite() && apply(step)) next = equations();
+      if (step.allFinite()) {
+        apply(step);
+        next = equations();
+      }
       if (!(next.H.size() > 0 && next.cost < now.cost)) {
         views_ = kept;
         numbers_ = kept_numbers;
-        camera_->set_correction(numbers_);
         damping *= 10;
         continue;
       }
@@ -100,28 +102,29 @@ class BoardAdjustment {
     return true;
   }
 
-  bool apply(const Eigen::VectorXd& step) {
+  void apply(const Eigen::VectorXd& step) {
     const Eigen::Index n = numbers_.size();
     numbers_ += step.head(n);
-    if (!camera_->set_correction(numbers_)) return false;
     for (std::size_t k = 0; k < views_.size(); ++k)
       views_[k].T_map_cam = views_[k].T_map_cam.plus(step.segment<6>(n + 6 * static_cast<Eigen::Index>(k)));
-    return true;
   }
 
-  /// Empty where a point is not in front of its camera.
+  /// Linearised where the numbers are now. Empty where they make no camera, or a point is not in front of it.
   NormalEquations equations() {
+    // Its derivatives are those at the numbers it was made with.
+    const auto camera = AdjustedCamera::create(corrected(given_, numbers_));
+    if (!camera) return {};
     const Eigen::Index n = numbers_.size(), all = n + 6 * static_cast<Eigen::Index>(views_.size());
     NormalEquations out{Eigen::MatrixXd::Zero(all, all), Eigen::VectorXd::Zero(all),
                         numbers_.dot(prior_ * numbers_)};
     out.H.topLeftCorner(n, n) = prior_;
     out.b.head(n) = -prior_ * numbers_;
     for (std::size_t k = 0; k < views_.size(); ++k)
-      if (!add(views_[k], n + 6 * static_cast<Eigen::Index>(k), &out)) return {};
+      if (!add(**camera, views_[k], n + 6 * static_cast<Eigen::Index>(k), &out)) return {};
     return out;
   }
 
-  bool add(BoardView& view, Eigen::Index place, NormalEquations* out) {
+  bool add(const AdjustedCamera& camera, BoardView& view, Eigen::Index place, NormalEquations* out) const {
     const Eigen::Index n = numbers_.size();
     const Pose T_cam_map = view.T_map_cam.inverse();
     const Eigen::Matrix3d R_cam_map = T_cam_map.rotation();
@@ -129,8 +132,8 @@ class BoardAdjustment {
     for (std::size_t i = 0; i < lattice_.points.size(); ++i) {
       const Eigen::Vector3d point = T_cam_map * lattice_.points[i];
       Matrix23d by_point;
-      const auto pixel = camera_->project(point, &by_point);
-      const auto by_numbers = camera_->by_numbers(point);
+      const auto pixel = camera.project(point, &by_point);
+      const auto by_numbers = camera.by_numbers(point);
       if (!pixel || !by_numbers) return false;
       const Eigen::Vector2d error = view.pixels[i] - *pixel;
       squares += error.squaredNorm();
@@ -147,7 +150,7 @@ class BoardAdjustment {
     return true;
   }
 
-  std::shared_ptr<AdjustedCamera> camera_;
+  const CameraIntrinsics given_;
   const Eigen::MatrixXd prior_;
   const BoardLattice& lattice_;
   std::vector<BoardView>& views_;
@@ -221,10 +224,10 @@ std::optional<Pose> best_pose_before_board(const Camera& camera, const BoardLatt
 
 Expected<BoardCamera> fit_board_camera(const CameraIntrinsics& given, const Eigen::MatrixXd& covariance,
                                        const BoardLattice& lattice, std::vector<BoardView>* views) {
-  const auto camera = AdjustedCamera::create(given);
+  const auto camera = make_camera(given);
   if (!camera) return camera.error();
   const auto pose = [&](BoardView& view) {
-    const auto found = pose_before_board((*camera)->given(), lattice, view.pixels);
+    const auto found = pose_before_board(**camera, lattice, view.pixels);
     if (found) view.T_map_cam = *found;
     return !found;
   };
@@ -232,7 +235,7 @@ Expected<BoardCamera> fit_board_camera(const CameraIntrinsics& given, const Eige
   const Error few{"the board", text("is whole in ", views->size(), " pictures of the events only"),
                   "record it whole, from several sides, for some seconds"};
   if (views->size() < kLeastViews) return few;
-  BoardAdjustment adjustment(*camera, covariance, lattice, views);
+  BoardAdjustment adjustment(given, covariance, lattice, views);
   const Error none{"the board", "its pictures fit no camera", "check its sizes and the focal length"};
   if (!adjustment.solve()) return none;
   const auto wrong = [](const BoardView& view) { return view.rms_px > kOutlier_px; };

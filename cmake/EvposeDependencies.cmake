@@ -45,8 +45,8 @@ if(EVPOSE_ONLY)
 endif()
 
 find_package(CLI11 REQUIRED)
-# Finds printed boards; without it `evpose calibrate` wants a start pose before them. Debian's CMake files ask for all of
-# OpenCV's libraries.
+# Both find printed boards: without them `evpose calibrate` wants a start pose before one. Debian's CMake files ask for
+# all of OpenCV's libraries.
 find_path(EVPOSE_opencv_INCLUDE opencv2/calib3d.hpp PATH_SUFFIXES opencv4)
 if(EVPOSE_opencv_INCLUDE)
   add_library(evpose_opencv INTERFACE)
@@ -55,6 +55,13 @@ if(EVPOSE_opencv_INCLUDE)
     find_library(EVPOSE_opencv_${library}_LIBRARY opencv_${library} REQUIRED)
     target_link_libraries(evpose_opencv INTERFACE ${EVPOSE_opencv_${library}_LIBRARY})
   endforeach()
+endif()
+find_path(EVPOSE_apriltag_INCLUDE apriltag/tag36h11.h)
+find_library(EVPOSE_apriltag_LIBRARY apriltag)
+if(EVPOSE_apriltag_INCLUDE AND EVPOSE_apriltag_LIBRARY)
+  add_library(evpose_apriltag INTERFACE)
+  target_include_directories(evpose_apriltag SYSTEM INTERFACE ${EVPOSE_apriltag_INCLUDE})
+  target_link_libraries(evpose_apriltag INTERFACE ${EVPOSE_apriltag_LIBRARY})
 endif()
 find_package(embree 3.12 REQUIRED)
 find_package(assimp REQUIRED)

@@ -32,7 +32,7 @@ build=(
   ca-certificates      # for npm's https
 )
 test=(
-  libopencv-calib3d-dev  # finds printed boards; the program may be built without
+  libopencv-calib3d-dev libapriltag-dev  # find printed boards; the program may be built without
   libgtest-dev         # unit tests
   libceres-dev         # the solver that ours are compared with
   libbenchmark-dev     # speed of the hot kernels
@@ -55,7 +55,7 @@ test=(
   clang-tidy-14        # pinned for the same reason
 )
 package=(
-  libopencv-calib3d-dev  # as above
+  libopencv-calib3d-dev libapriltag-dev  # as above
   dpkg-dev file        # what a Debian package depends on
   python3-dev pybind11-dev python3-pip python3-setuptools python3-wheel  # the Python module and its wheel
 )

@@ -69,6 +69,7 @@ OUTSIDE = [
     ("assimp", r"assimp/", {"sim"}),
     ("Boost", r"boost/", {"view"}),
     ("OpenCV", r"opencv2/", {"calibrate"}),
+    ("AprilTag", r"apriltag/", {"calibrate"}),
     ("CLI11", r"CLI/", {"apps"}),
 ]
 # Opening files and printing.

@@ -128,8 +128,9 @@ class BoardAdjustment {
     const Eigen::Index n = numbers_.size();
     const Pose T_cam_map = view.T_map_cam.inverse();
     const Eigen::Matrix3d R_cam_map = T_cam_map.rotation();
-    double squares = 0;
+    double squares = 0, seen = 0;
     for (std::size_t i = 0; i < lattice_.points.size(); ++i) {
+      if (!view.pixels[i].allFinite()) continue;
       const Eigen::Vector3d point = T_cam_map * lattice_.points[i];
       Matrix23d by_point;
       const auto pixel = camera.project(point, &by_point);
@@ -137,6 +138,7 @@ class BoardAdjustment {
       if (!pixel || !by_numbers) return false;
       const Eigen::Vector2d error = view.pixels[i] - *pixel;
       squares += error.squaredNorm();
+      ++seen;
       const Matrix26d J = by_pose(by_point, R_cam_map, point);
       out->H.topLeftCorner(n, n) += weight_ * by_numbers->transpose() * *by_numbers;
       out->H.block(0, place, n, 6) += weight_ * by_numbers->transpose() * J;
@@ -146,7 +148,7 @@ class BoardAdjustment {
       out->cost += weight_ * error.squaredNorm();
     }
     out->H.block(place, 0, 6, n) = out->H.block(0, place, n, 6).transpose();
-    view.rms_px = std::sqrt(squares / static_cast<double>(lattice_.points.size()));
+    view.rms_px = std::sqrt(squares / std::max(1.0, seen));
     return true;
   }
 
@@ -180,6 +182,7 @@ std::optional<Pose> pose_before_board(const Camera& camera, const BoardLattice& 
   std::vector<Eigen::Vector2d> plane, seen;
   const double scale = lattice.points.front().norm();  // the equations are well conditioned in that unit
   for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (!pixels[i].allFinite()) continue;
     const auto ray = camera.unproject(pixels[i]);
     if (!ray || !(ray->z() > 0.1)) continue;
     plane.emplace_back(lattice.points[i].x() / scale, lattice.points[i].z() / scale);
@@ -208,6 +211,7 @@ std::optional<Pose> best_pose_before_board(const Camera& camera, const BoardLatt
     Matrix6d H = Matrix6d::Zero();
     Vector6d b = Vector6d::Zero();
     for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (!pixels[i].allFinite()) continue;
       const Eigen::Vector3d point = T_cam_map * lattice.points[i];
       Matrix23d by_point;
       const auto pixel = camera.project(point, &by_point);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <random>
 
 #include "evpose/camera/adjusted_camera.h"
@@ -31,7 +32,7 @@ Eigen::MatrixXd known_roughly() {
 
 class BoardBefore : public ::testing::Test {
  protected:
-  BoardBefore() : camera_(*make_camera(kTruth)), lattice_(*lattice_of(Checkerboard{9, 7, 0.08})) {}
+  BoardBefore() : camera_(*make_camera(kTruth)), lattice_(lattice_of(Checkerboard{9, 7, 0.08})) {}
 
   /// From about a metre before it, turned by some tenths of a radian about each axis.
   Pose pose() {
@@ -135,6 +136,21 @@ TEST_F(BoardBefore, AViewOfSomethingElseIsTakenOut) {
   ASSERT_TRUE(found.ok()) << found.error().line();
   EXPECT_EQ(views.size(), 6u);
   EXPECT_LT(found->rms_px, 0.05);
+}
+
+TEST_F(BoardBefore, PointsThatAreNotSeenDoNotCount) {
+  std::vector<BoardView> views;
+  std::vector<Pose> truth;
+  for (int i = 0; i < 12; ++i) {
+    truth.push_back(pose());
+    views.push_back(view(truth.back()));
+    for (std::size_t k = i % 3; k < views.back().pixels.size(); k += 3)
+      views.back().pixels[k].setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  const auto found = fit_board_camera(data_sheet(), 1e8 * known_roughly(), lattice_, &views);
+  ASSERT_TRUE(found.ok()) << found.error().line();
+  EXPECT_NEAR(corrected(data_sheet(), found->correction).fx, kTruth.fx, 1e-2);
+  for (std::size_t i = 0; i < views.size(); ++i) EXPECT_LT(views[i].T_map_cam.minus(truth[i]).norm(), 1e-3);
 }
 
 TEST_F(BoardBefore, TooFewViewsAreAnError) {

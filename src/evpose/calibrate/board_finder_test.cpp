@@ -88,7 +88,7 @@ double furthest(const LatticePixels& a, const LatticePixels& b) {
 
 TEST(BoardFinder, OneOfTheOrdersIsTheBoards) {
   for (const Checkerboard& board : {Checkerboard{6, 4, 0.08}, Checkerboard{6, 6, 0.08}}) {
-    const BoardLattice lattice = *lattice_of(board);
+    const BoardLattice lattice = lattice_of(board);
     const int columns = lattice.columns, rows = lattice.rows;
     const LatticePixels truth = pixels_of(lattice, 0.3);
     // As found: from the upper left, from the lower right, mirrored.
@@ -110,7 +110,7 @@ TEST(BoardFinder, OneOfTheOrdersIsTheBoards) {
 
 TEST(BoardFinder, CheckersAgreeInTheRightOrderAlone) {
   const Checkerboard board{7, 4, 0.08};  // an odd sum: turned, dark cells lie on bright ones
-  const BoardLattice lattice = *lattice_of(board);
+  const BoardLattice lattice = lattice_of(board);
   const auto picture = picture_of(board, 0.2);
   LatticePixels order = pixels_of(lattice, 0.2);
   EXPECT_GT(checkers_agree(picture, kSize, order, lattice.columns, lattice.rows), 0);
@@ -119,41 +119,74 @@ TEST(BoardFinder, CheckersAgreeInTheRightOrderAlone) {
 }
 
 TEST(BoardFinder, FindsCornersWhereTheyAre) {
-  if (!BoardFinder::available()) GTEST_SKIP() << "built without OpenCV";
+  if (!make_grid_finder(Checkerboard{})) GTEST_SKIP() << "built without OpenCV";
   const Checkerboard odd{8, 5, 0.09}, even{9, 7, 0.06};
   for (const Checkerboard& board : {odd, even}) {
-    const BoardLattice lattice = *lattice_of(board);
-    const BoardFinder finder(board, lattice);
+    const BoardLattice lattice = lattice_of(board);
+    const auto finder = make_grid_finder(board);
     for (const double turn_rad : {0.0, 0.4, 2.9}) {
       const LatticePixels truth = pixels_of(lattice, turn_rad);
       // A board that looks the same upside down is found upright, or as it was last.
       const auto found =
-          finder.find(picture_of(board, turn_rad), kSize, board == even ? truth : LatticePixels());
+          finder->find(picture_of(board, turn_rad), kSize, board == even ? truth : LatticePixels());
       ASSERT_TRUE(found.has_value()) << turn_rad;
       EXPECT_LT(furthest(*found, truth), 0.3) << turn_rad;
     }
   }
-  const auto upright = BoardFinder(even, *lattice_of(even)).find(picture_of(even, 2.9), kSize);
+  const auto upright = make_grid_finder(even)->find(picture_of(even, 2.9), kSize, {});
   ASSERT_TRUE(upright.has_value());
   EXPECT_LT(upright->back().y(), upright->front().y());
 }
 
 TEST(BoardFinder, FindsDiscsWhereTheyAre) {
-  if (!BoardFinder::available()) GTEST_SKIP() << "built without OpenCV";
+  if (!make_grid_finder(Checkerboard{})) GTEST_SKIP() << "built without OpenCV";
   for (const CircleGrid& board : {CircleGrid{7, 5, 0.1, 0.05, false}, CircleGrid{4, 9, 0.07, 0.05, true}}) {
-    const BoardLattice lattice = *lattice_of(board);
+    const BoardLattice lattice = lattice_of(board);
     const LatticePixels truth = pixels_of(lattice, 0.1);
-    const auto found = BoardFinder(board, lattice).find(picture_of(board, lattice, 0.1), kSize);
+    const auto found = make_grid_finder(board)->find(picture_of(board, lattice, 0.1), kSize, {});
     ASSERT_TRUE(found.has_value()) << board.shifted;
     EXPECT_LT(furthest(*found, truth), 0.4) << board.shifted;
   }
 }
 
+TEST(BoardFinder, FindsTagsWhereTheyAre) {
+  const AprilGrid board{2, 2, 0.2, 0.3};
+  const auto finder = make_tag_finder(board);
+  if (!finder) GTEST_SKIP() << "built without AprilTag";
+  // Of tags 0 to 3, the inner 6 x 6 cells from the upper left, row by row: 1 is white.
+  const char* const bits[4] = {"110101011101011000101000010110000100", "110110010111111100011000101101001001",
+                               "110111010010100000001001000100001110",
+                               "111001000111100111101001110010011000"};
+  const BoardLattice lattice = lattice_of(board);
+  for (const double turn_rad : {0.0, 0.5}) {
+    Drawing drawing;
+    for (std::size_t tag = 0; tag < 4; ++tag) {
+      const Eigen::Vector3d corner = lattice.points[4 * tag];  // lower left
+      for (int i = -60; i < 860; ++i)
+        for (int k = -60; k < 860; ++k) {
+          const Eigen::Vector3d p = corner + board.tag_m / 800 * Eigen::Vector3d(i + 0.5, 0, k + 0.5);
+          const int column = static_cast<int>(std::floor(i / 100.0)) - 1,
+                    row = 6 - static_cast<int>(std::floor(k / 100.0));
+          const bool outside = i < 0 || k < 0 || i >= 800 || k >= 800;
+          const bool inside = column >= 0 && row >= 0 && column < 6 && row < 6;
+          const bool white = outside || (inside && bits[tag][6 * row + column] == '1');
+          drawing.add(p, turn_rad, white ? 1 : -1);
+        }
+    }
+    const auto found = finder->find(drawing.picture(), kSize, {});
+    ASSERT_TRUE(found.has_value()) << turn_rad;
+    EXPECT_LT(furthest(*found, pixels_of(lattice, turn_rad)), 0.5) << turn_rad;
+  }
+}
+
 TEST(BoardFinder, NothingIsFoundInNothing) {
-  const Checkerboard board;
   const std::vector<float> grey(static_cast<std::size_t>(kSize.width) * kSize.height, 0.0F);
-  EXPECT_FALSE(BoardFinder(board, *lattice_of(board)).find(grey, kSize).has_value());
-  EXPECT_FALSE(lattice_of(AprilGrid{}).has_value());
+  for (const Board& board : {Board(Checkerboard{}), Board(AprilGrid{})}) {
+    const auto finder = make_board_finder(board);
+    if (finder) {
+      EXPECT_FALSE((*finder)->find(grey, kSize, {}).has_value());
+    }
+  }
 }
 
 TEST(EventImage, KeepsTheSignOfWhatHasPassedForAWhile) {

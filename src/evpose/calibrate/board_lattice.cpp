@@ -2,13 +2,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "evpose/calibrate/board_finder.h"
 
 namespace evpose {
 namespace {
 
-std::optional<BoardLattice> lattice(const Checkerboard& b) {
+BoardLattice lattice(const Checkerboard& b) {
   BoardLattice out{b.columns - 1, b.rows - 1, {}};
   for (int row = 1; row < b.rows; ++row)
     for (int column = 1; column < b.columns; ++column)
@@ -16,9 +17,20 @@ std::optional<BoardLattice> lattice(const Checkerboard& b) {
   return out;
 }
 
-std::optional<BoardLattice> lattice(const AprilGrid&) { return {}; }
+BoardLattice lattice(const AprilGrid& b) {
+  BoardLattice out{b.columns, b.rows, {}};
+  const double step = (1 + b.spacing) * b.tag_m;
+  for (int row = 0; row < b.rows; ++row)
+    for (int column = 0; column < b.columns; ++column) {
+      const Eigen::Vector3d middle(step * (column - 0.5 * (b.columns - 1)), 0,
+                                   step * (row - 0.5 * (b.rows - 1)));
+      for (const auto& [x, z] : {std::pair(-0.5, -0.5), {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}})
+        out.points.push_back(middle + b.tag_m * Eigen::Vector3d(x, 0, z));
+    }
+  return out;
+}
 
-std::optional<BoardLattice> lattice(const CircleGrid& b) {
+BoardLattice lattice(const CircleGrid& b) {
   BoardLattice out{b.columns, b.rows, {}};
   const double step = b.shifted ? 2 * b.distance_m : b.distance_m;
   const double width = step * (b.columns - 1) + (b.shifted ? b.distance_m : 0);
@@ -31,8 +43,28 @@ std::optional<BoardLattice> lattice(const CircleGrid& b) {
 
 }  // namespace
 
-std::optional<BoardLattice> lattice_of(const Board& board) {
+BoardLattice lattice_of(const Board& board) {
   return std::visit([](const auto& b) { return lattice(b); }, board);
+}
+
+Expected<std::unique_ptr<BoardFinder>> make_board_finder(const Board& board) {
+  const auto* tags = std::get_if<AprilGrid>(&board);
+  auto finder = tags != nullptr ? make_tag_finder(*tags) : make_grid_finder(board);
+  if (finder) return finder;
+  return Error{"the board",
+               text("cannot be looked for: this program was built without ", tags ? "AprilTag" : "OpenCV"),
+               text("install ", tags ? "libapriltag-dev" : "libopencv-calib3d-dev",
+                    " and build again, or give a start pose with --init")};
+}
+
+float full_value(std::span<const float> picture) {
+  constexpr double kFull = 0.97;
+  std::vector<float> magnitude(picture.size());
+  std::ranges::transform(picture, magnitude.begin(), [](float v) { return std::abs(v); });
+  const auto full =
+      magnitude.begin() + static_cast<std::ptrdiff_t>(kFull * static_cast<double>(picture.size()));
+  std::nth_element(magnitude.begin(), full, magnitude.end());
+  return *full;
 }
 
 std::vector<LatticePixels> orders_from_front(const LatticePixels& grid, int columns, int rows) {

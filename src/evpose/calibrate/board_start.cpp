@@ -149,27 +149,24 @@ std::optional<StartState> BoardSighting::start(const Camera& camera, const Pose&
 Expected<std::optional<BoardStart>> find_board_start(const std::vector<Recording>& recordings,
                                                      const Board& board, const CameraIntrinsics& given,
                                                      const CalibrationSigma& sigma, const Told& progress) {
-  const auto lattice = lattice_of(board);
-  if (!lattice)
-    return Error{"the board", "is an AprilGrid: its tags are not read", "give a start pose with --init"};
-  if (!BoardFinder::available())
-    return Error{"the board", "cannot be looked for: this program was built without OpenCV",
-                 "install libopencv-calib3d-dev and build again, or give a start pose with --init"};
-  const BoardFinder finder(board, *lattice);
+  const BoardLattice lattice = lattice_of(board);
+  const auto finder = make_board_finder(board);
+  if (!finder) return finder.error();
   std::vector<BoardView> all;
   for (std::size_t k = 0; k < recordings.size(); ++k) {
     const auto told = [&](double share) {
       return progress((static_cast<double>(k) + share) / static_cast<double>(recordings.size()));
     };
-    auto views = find_views(recordings[k], static_cast<int>(k), finder, told);
+    auto views = find_views(recordings[k], static_cast<int>(k), **finder, told);
     if (!views) return views.error();
     if (!*views) return std::optional<BoardStart>();
     if ((*views)->empty())
-      return Error{recordings[k].folder, "the board is never seen whole",
-                   "check its counts of columns and rows, or give a start pose with --init"};
+      return Error{
+          recordings[k].folder, "the board is never seen",
+          "check its counts of columns and rows and record it whole, or give a start pose with --init"};
     all.insert(all.end(), (*views)->begin(), (*views)->end());
   }
-  auto camera = fit_board_camera(given, covariance_of(sigma, given), *lattice, &all);
+  auto camera = fit_board_camera(given, covariance_of(sigma, given), lattice, &all);
   if (!camera) return camera.error();
   const auto found = make_camera(corrected(given, camera->correction));
   if (!found) return found.error();
@@ -187,7 +184,7 @@ Expected<std::optional<BoardStart>> find_board_start(const std::vector<Recording
     if (fitting.empty())
       return Error{recordings[k].folder, "no picture of the board fits the camera of the others",
                    "check that one camera made all recordings"};
-    out.sightings.push_back(sighting_of(*lattice, fitting, recordings[k].T_cam_body));
+    out.sightings.push_back(sighting_of(lattice, fitting, recordings[k].T_cam_body));
     const auto start = out.sightings.back().start(**found, recordings[k].T_cam_body);
     if (!start) return Error{recordings[k].folder, "the board is not seen at the start", "give --init"};
     out.starts.push_back(*start);

@@ -14,8 +14,9 @@ namespace evpose {
 namespace {
 
 constexpr int kFilterRuns = 2;  // of the first recording: the second from what the first has found
-constexpr int kMostFilterRuns = 4;
-constexpr double kGoodRun = 0.8;  // share of accepted updates with which another run begins no better
+// Before a board, until a run changes little of what the one before has found, in its sigmas.
+constexpr int kMostFilterRuns = 6;
+constexpr double kGoodRun = 0.8, kSettled = 0.3;
 constexpr int kMostPasses = 24;
 // Share of what is measured that counts: what contours are off by lasts as long as they are in view, which
 // adds up over a flight in what does not change and hardly in its poses. docs/decisions/fusion.md has the
@@ -45,6 +46,15 @@ std::string values_words(const StaticParameters& parameters) {
   const Eigen::Vector3d turn_deg = so3::log(found.turn) * (180 / M_PI);
   return out + text(", turn ", turn_deg.x(), " ", turn_deg.y(), " ", turn_deg.z(), " deg, time ",
                     1e3 * found.time_offset_s, " ms");
+}
+
+/// The largest of the intrinsics, in sigmas of the second.
+double change_of(const Calibration& a, const Calibration& b) {
+  if (a.intrinsics.size() == 0 || a.intrinsics.size() != b.intrinsics.size()) return 0;
+  return (b.intrinsics - a.intrinsics)
+      .cwiseQuotient(b.intrinsics_sigma.cwiseMax(1e-12))
+      .cwiseAbs()
+      .maxCoeff();
 }
 
 /// Why updates are not accepted, as it was said last.
@@ -130,8 +140,9 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
     flights_.push_back(std::make_unique<BatchEstimator>(jobs_[k], parameters_));
     BatchEstimator& flight = *flights_.back();
     const int runs = k == 0 ? kFilterRuns : 1;
-    const auto runs_well = [&] { return accepted_share(k) >= kGoodRun; };
-    for (int run = 0; run < runs || (board_ && run < kMostFilterRuns && !runs_well()); ++run) {
+    bool settled = !board_;
+    for (int run = 0; run < runs || (!settled && run < kMostFilterRuns); ++run) {
+      const Calibration before = parameters_->calibration();
       if (board_) begin_before_board(flight, board_->sightings[k]);
       const auto told = [&](double share) { return go_on(progress, share); };
       if (auto ok = flight.filter(request, told); !ok) return ok;
@@ -144,6 +155,8 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
             jobs_[k].recording.folder,
             text("the events never gathered at the map's contours (", reason_of(flight.updates()), ")"),
             "check the start pose, the map and the focal length"};
+      if (board_)
+        settled = accepted_share(k) >= kGoodRun && change_of(before, parameters_->calibration()) < kSettled;
       if (k == 0 && run == 0 && !board_)
         if (auto ok = look_along_flight(request, told); !ok || interrupted_) return ok;
     }

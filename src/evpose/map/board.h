@@ -15,7 +15,7 @@ struct Checkerboard {
 };
 
 /// Kalibr's: tags in rows and columns, small dark squares between their corners. Of a tag its outline alone
-/// is known, not what is printed inside.
+/// is among the contours, not what is printed inside.
 struct AprilGrid {
   int columns = 6, rows = 6;  ///< tags
   double tag_m = 0.088;       ///< side of a tag

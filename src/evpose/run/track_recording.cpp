@@ -229,9 +229,11 @@ std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibra
     to.distortion.emplace(sigma.begin() + 4, sigma.end());
   };
   of_numbers(numbers, given.sigma);
-  given.sigma.rotation_rad = stated.of_rotation_rad();
-  given.sigma.translation_m = stated.of_translation_m();
-  given.sigma.time_s = stated.of_time_s();
+  if (recording.has_imu) {
+    given.sigma.rotation_rad = stated.of_rotation_rad();
+    given.sigma.translation_m = stated.of_translation_m();
+    given.sigma.time_s = stated.of_time_s();
+  }
   out.found = given;
   CalibratedCamera& known = out.found;
   if (found.intrinsics.size() > 0) {

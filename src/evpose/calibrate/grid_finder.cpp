@@ -11,16 +11,10 @@ namespace {
 
 constexpr int kLeastWidth = 1000;  // px; squares of 6 px are not found in a picture as it is
 constexpr double kBlur_px = 0.7;
-constexpr double kFull = 0.97;  // share of the pixels within the range of grey values
 
 /// Grey values, enlarged. `factor`: by how much.
 cv::Mat grey_picture(std::span<const float> picture, ImageSize size, int* factor) {
-  std::vector<float> magnitude(picture.size());
-  std::ranges::transform(picture, magnitude.begin(), [](float v) { return std::abs(v); });
-  const auto full =
-      magnitude.begin() + static_cast<std::ptrdiff_t>(kFull * static_cast<double>(picture.size()));
-  std::nth_element(magnitude.begin(), full, magnitude.end());
-  const float scale = 100 / std::max(*full, 1e-9F);
+  const float scale = 100 / std::max(full_value(picture), 1e-9F);
   cv::Mat values(size.height, size.width, CV_32F), blurred, enlarged, grey;
   std::ranges::transform(picture, values.begin<float>(), [&](float v) { return 127 + scale * v; });
   cv::GaussianBlur(values, blurred, {}, kBlur_px);
@@ -51,30 +45,41 @@ double distance_of(const LatticePixels& a, const LatticePixels& b) {
   return sum;
 }
 
+class GridFinder final : public BoardFinder {
+ public:
+  explicit GridFinder(const Board& board) : board_(board), lattice_(lattice_of(board)) {}
+
+  std::optional<LatticePixels> find(std::span<const float> picture, ImageSize size,
+                                    const LatticePixels& last) const override {
+    int factor = 1;
+    const cv::Mat grey = grey_picture(picture, size, &factor);
+    std::vector<cv::Point2f> found;
+    if (!find_points(board_, lattice_, grey, &found) || found.size() != lattice_.points.size()) return {};
+    LatticePixels pixels;
+    for (const cv::Point2f& p : found)
+      pixels.push_back((Eigen::Vector2d(p.x, p.y).array() + 0.5) / factor - 0.5);
+    std::vector<LatticePixels> orders = orders_from_front(pixels, lattice_.columns, lattice_.rows);
+    if (std::holds_alternative<Checkerboard>(board_))
+      std::erase_if(orders, [&](const LatticePixels& order) {
+        return checkers_agree(picture, size, order, lattice_.columns, lattice_.rows) <= 0;
+      });
+    const auto cost = [&](const LatticePixels& order) {
+      if (!last.empty()) return distance_of(order, last);
+      return order.back().y() - order.front().y();  // upper right above lower left
+    };
+    const auto best = std::ranges::min_element(orders, {}, cost);
+    return best == orders.end() ? std::nullopt : std::optional(*best);
+  }
+
+ private:
+  Board board_;
+  BoardLattice lattice_;
+};
+
 }  // namespace
 
-bool BoardFinder::available() { return true; }
-
-std::optional<LatticePixels> BoardFinder::find(std::span<const float> picture, ImageSize size,
-                                               const LatticePixels& last) const {
-  int factor = 1;
-  const cv::Mat grey = grey_picture(picture, size, &factor);
-  std::vector<cv::Point2f> found;
-  if (!find_points(board_, lattice_, grey, &found) || found.size() != lattice_.points.size()) return {};
-  LatticePixels pixels;
-  for (const cv::Point2f& p : found)
-    pixels.push_back((Eigen::Vector2d(p.x, p.y).array() + 0.5) / factor - 0.5);
-  std::vector<LatticePixels> orders = orders_from_front(pixels, lattice_.columns, lattice_.rows);
-  if (std::holds_alternative<Checkerboard>(board_))
-    std::erase_if(orders, [&](const LatticePixels& order) {
-      return checkers_agree(picture, size, order, lattice_.columns, lattice_.rows) <= 0;
-    });
-  const auto cost = [&](const LatticePixels& order) {
-    if (!last.empty()) return distance_of(order, last);
-    return order.back().y() - order.front().y();  // upper right above lower left
-  };
-  const auto best = std::ranges::min_element(orders, {}, cost);
-  return best == orders.end() ? std::nullopt : std::optional(*best);
+std::unique_ptr<BoardFinder> make_grid_finder(const Board& board) {
+  return std::make_unique<GridFinder>(board);
 }
 
 }  // namespace evpose

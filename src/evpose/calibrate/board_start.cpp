@@ -16,6 +16,8 @@ namespace {
 constexpr TimeNs kPictureEvery = 100 * kNsPerMs;  // pictures, at first: neighbours tell the velocity
 constexpr std::size_t kClose = 15, kMostPictures = 60;
 constexpr TimeNs kNeighbours = 3 * kPictureEvery / 2;
+// Before, there are bands behind the edges alone, and the board is found in them beside where it is.
+constexpr TimeNs kFirstPicture = 3 * kPictureEvery;
 constexpr double kGravity_m_s2 = 9.81;
 constexpr TimeNs kLeastOfGravity = 500 * kNsPerMs;
 
@@ -24,7 +26,7 @@ using Told = std::function<bool(double)>;
 /// Times of pictures: some close to each other, the rest over the whole recording.
 std::vector<TimeNs> picture_times(const Recording& recording) {
   std::vector<TimeNs> out;
-  for (TimeNs t = recording.first_ns + kPictureEvery; t <= recording.last_ns && out.size() < kClose;
+  for (TimeNs t = recording.first_ns + kFirstPicture; t <= recording.last_ns && out.size() < kClose;
        t += kPictureEvery)
     out.push_back(t);
   if (out.empty()) return out;

@@ -20,7 +20,8 @@
 namespace evpose {
 namespace {
 
-constexpr double kBoardSigmas = 3;  // events are offset from a board's points by more than these scatter
+constexpr double kBoardSigmas = 3;    // events are offset from a board's points by more than these scatter
+constexpr double kBoardPlace_px = 1;  // pictures of events show a board ahead of or behind where it is
 constexpr double kBoardVelocity_m_s = 0.1, kBoardRate_rad_s = 0.1;  // mean over 0.2 s
 constexpr double kBoardGravity_rad = 0.02;
 constexpr double kRefuted = 5;  // given sigmas by which the events may contradict what was given
@@ -31,14 +32,19 @@ bool is_known(const CalibrationSigma& sigma, const Recording& recording) {
          (!recording.has_imu || (mounting && sigma.of_time_s() == 0));
 }
 
-Expected<TrackJob> job_of(const TrackRequest& request, const RunConfig& config) {
+/// Contours of a hall tell the distortion of most of the image, a board's that of where it was held.
+CalibrationSigma start_sigma(const CalibrationSigma& stated, const CameraIntrinsics& camera, bool board) {
+  return board ? any_lens_sigma(stated, camera) : data_sheet_sigma(stated, camera);
+}
+
+Expected<TrackJob> job_of(const TrackRequest& request, const RunConfig& config, bool board) {
   auto job = prepare(request, config);
   if (!job) return job;
   // It looks for a pose as the given calibration would see it; the alignment of the start looks for both.
   job->config.tracker.relocalization.on = false;
   Recording& recording = job->recording;
   recording.camera = with_distortion(recording.camera);
-  const CalibrationSigma sigma = data_sheet_sigma(recording.calibration_sigma, recording.camera);
+  const CalibrationSigma sigma = start_sigma(recording.calibration_sigma, recording.camera, board);
   if (is_known(sigma, recording))
     return Error{recording.calibration_path, "states that all of it is known",
                  "leave out the sigmas that are zero, or give another one with --start"};
@@ -85,6 +91,25 @@ std::string init_words(const StartState& start) {
   return words;
 }
 
+/// The start as the board's pictures have it, with what it may be off.
+void begin_before_board(const BoardStart& found, std::size_t k, TrackJob* job) {
+  job->start = found.starts[k];
+  FusionConfig& fusion = job->config.tracker.fusion;
+  const double seen_rad = kBoardPlace_px / job->setup.camera->focal_px();
+  fusion.start_rotation_sigma_rad = std::max(fusion.start_rotation_sigma_rad, seen_rad);
+  fusion.start_position_sigma_m =
+      std::max(fusion.start_position_sigma_m, seen_rad * job->start.T_map_body.p.norm());
+  if (found.sightings[k].tells_velocity()) {
+    fusion.start_velocity_sigma_m_s = kBoardVelocity_m_s;
+    fusion.start_angular_rate_sigma_rad_s = kBoardRate_rad_s;
+  }
+  if (found.gravity) {
+    fusion.gravity_map = *found.gravity;
+    fusion.calibration.gravity = true;
+    fusion.calibration.start_gravity_sigma_rad = kBoardGravity_rad;
+  }
+}
+
 /// What there is to do, and what a board has told.
 struct Work {
   std::vector<TrackJob> jobs;
@@ -107,34 +132,21 @@ Expected<std::optional<Work>> work_of(const CalibrateRequest& request,
   std::optional<BoardStart> found;
   if (*board) {
     const CameraIntrinsics given = with_distortion(recordings->front().camera);
-    auto start = find_board_start(*recordings, **board, given,
-                                  data_sheet_sigma(recordings->front().calibration_sigma, given), progress);
+    const CalibrationSigma sigma = start_sigma(recordings->front().calibration_sigma, given, true);
+    auto start = find_board_start(*recordings, **board, given, sigma, progress);
     if (!start) return start.error();
     if (!*start) return std::optional<Work>();
     found = std::move(*start);
-    const Eigen::VectorXd known =
-        data_sheet_sigma(recordings->front().calibration_sigma, given).of_intrinsics(given);
     out.board =
-        BoardBeginning{found->correction, known.cwiseMin(kBoardSigmas * found->sigma), found->sightings};
+        BoardBeginning{found->correction, sigma.of_intrinsics(given).cwiseMin(kBoardSigmas * found->sigma),
+                       found->sightings};
   }
   for (std::size_t k = 0; k < recordings->size(); ++k) {
     one.recording = request.recordings[k];
     if (found) one.init = init_words(found->starts[k]);
-    auto job = job_of(one, *config);
+    auto job = job_of(one, *config, found.has_value());
     if (!job) return job.error();
-    if (found) {
-      job->start = found->starts[k];
-      FusionConfig& fusion = job->config.tracker.fusion;
-      if (found->sightings[k].tells_velocity()) {
-        fusion.start_velocity_sigma_m_s = kBoardVelocity_m_s;
-        fusion.start_angular_rate_sigma_rad_s = kBoardRate_rad_s;
-      }
-      if (found->gravity) {
-        fusion.gravity_map = *found->gravity;
-        fusion.calibration.gravity = true;
-        fusion.calibration.start_gravity_sigma_rad = kBoardGravity_rad;
-      }
-    }
+    if (found) begin_before_board(*found, k, &*job);
     out.jobs.push_back(std::move(*job));
   }
   return std::optional(std::move(out));

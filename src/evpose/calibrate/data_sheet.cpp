@@ -12,6 +12,9 @@ constexpr double kCentre = 0.03;                 // of the image's width
 constexpr double kRadial = 0.1, kTangential = 2e-3;
 constexpr double kRotation_rad = 2 * M_PI / 180, kTranslation_m = 0.03, kTime_s = 0.01;
 
+// k1 and k2 that show an equidistant lens out to 39 deg from the axis: 1 sigma of all lenses, beside kRadial.
+constexpr double kEquidistant[] = {-0.32, 0.12};
+
 std::vector<double> distortion_sigma(const CameraIntrinsics& camera) {
   std::vector<double> out(camera.distortion.size(), kRadial);
   if (camera.distortion_model == "radtan") std::fill_n(out.begin() + 2, 2, kTangential);
@@ -39,6 +42,16 @@ CalibrationSigma data_sheet_sigma(const CalibrationSigma& stated, const CameraIn
   if (!out.rotation_rad) out.rotation_rad = Eigen::Vector3d::Constant(kRotation_rad);
   if (!out.translation_m) out.translation_m = Eigen::Vector3d::Constant(kTranslation_m);
   if (!out.time_s) out.time_s = kTime_s;
+  return out;
+}
+
+CalibrationSigma any_lens_sigma(const CalibrationSigma& stated, const CameraIntrinsics& camera) {
+  CalibrationSigma out = data_sheet_sigma(stated, camera);
+  if (stated.distortion || stated.correlation || camera.distortion_model != "radtan") return out;
+  for (int i = 0; i < 2; ++i) (*out.distortion)[i] = std::hypot(kRadial, kEquidistant[i]);
+  Eigen::MatrixXd R = out.of_correlation(camera);
+  R(4, 5) = R(5, 4) = kEquidistant[0] * kEquidistant[1] / ((*out.distortion)[0] * (*out.distortion)[1]);
+  out.correlation = R;
   return out;
 }
 

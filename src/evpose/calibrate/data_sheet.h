@@ -10,6 +10,11 @@ namespace evpose {
 /// radial distortion 0.1; camera in the body 2 deg and 30 mm, time offset 10 ms.
 CalibrationSigma data_sheet_sigma(const CalibrationSigma& stated, const CameraIntrinsics& camera);
 
+/// The same for a camera that may have any ordinary lens: one without distortion, with angles in proportion
+/// to the radius (equidistant), or between. Wanted where contours are seen in a small part of the image, so
+/// that the rest of it is as uncertain as such lenses differ. Of the radial-tangential model alone.
+CalibrationSigma any_lens_sigma(const CalibrationSigma& stated, const CameraIntrinsics& camera);
+
 /// The same without what is stated, but for what is known.
 CalibrationSigma only_data_sheet(const CalibrationSigma& stated, const CameraIntrinsics& camera);
 

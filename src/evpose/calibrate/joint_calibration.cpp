@@ -57,6 +57,25 @@ double change_of(const Calibration& a, const Calibration& b) {
       .maxCoeff();
 }
 
+/// What a run has found, with what was given: numbers that it hardly tells would drift from run to run.
+void join_with_given(StaticParameters* parameters) {
+  constexpr double kKnown = 1e-9;
+  const Calibration& found = parameters->calibration();
+  const StaticParameters::Places& places = parameters->places();
+  const int n = parameters->size();
+  ParameterInformation told{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
+  const auto add = [&](std::optional<int> place, const Eigen::VectorXd& sigma) {
+    if (place)
+      told.S.diagonal().segment(*place, sigma.size()) = sigma.cwiseMax(kKnown).cwiseAbs2().cwiseInverse();
+  };
+  add(places.time, Eigen::VectorXd::Constant(1, found.time_sigma_s));
+  add(places.rotation, found.turn_sigma_rad);
+  add(places.translation, found.shift_sigma_m);
+  add(places.gravity, found.gravity_sigma_rad);
+  add(places.intrinsics, found.intrinsics_sigma);
+  parameters->correct(parameters->solve(told));
+}
+
 /// Why updates are not accepted, as it was said last.
 std::string reason_of(std::span<const Update> updates) {
   for (auto u = updates.rbegin(); u != updates.rend(); ++u)
@@ -147,6 +166,7 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
       const auto told = [&](double share) { return go_on(progress, share); };
       if (auto ok = flight.filter(request, told); !ok) return ok;
       if (interrupted_) return {};
+      if (board_) join_with_given(parameters_.get());
       log_detail(text("filter: ", std::lround(100 * share_of_accepted(flight.updates())), " % accepted, ",
                       values_words(*parameters_)));
       ++done_;

@@ -67,5 +67,21 @@ TEST(DataSheet, StatesWideSigmasWhereNothingIsStated) {
   EXPECT_GT((*only_data_sheet(stated, kCamera).distortion)[0], 0.05);
 }
 
+TEST(DataSheet, AnEquidistantLensIsOneOfAnyLenses) {
+  const CalibrationSigma sigma = any_lens_sigma({}, kCamera);
+  const Eigen::VectorXd s = sigma.of_intrinsics(kCamera);
+  const Eigen::Matrix2d P = s.segment<2>(4).asDiagonal() * sigma.of_correlation(kCamera).block<2, 2>(4, 4) *
+                            s.segment<2>(4).asDiagonal();
+  const auto sigmas = [&](double k1, double k2) {
+    const Eigen::Vector2d k(k1, k2);
+    return std::sqrt(k.dot(P.ldlt().solve(k)));
+  };
+  EXPECT_LT(sigmas(-0.32, 0.12), 1);
+  EXPECT_GT(sigmas(-0.32, -0.12), 1.5);  // folds back
+  CalibrationSigma stated;
+  stated.distortion = {1e-3, 1e-3, 1e-4, 1e-4};
+  EXPECT_EQ(any_lens_sigma(stated, kCamera).distortion, stated.distortion);
+}
+
 }  // namespace
 }  // namespace evpose

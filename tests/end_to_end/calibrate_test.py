@@ -14,6 +14,7 @@ except ImportError as missing:
     print(f"skipped: {missing}: scripts/packages.sh test")
     sys.exit(77)
 
+import april_grid
 from recording import CALIBRATION, Recording
 
 EVPOSE = None
@@ -70,23 +71,27 @@ class CalibrateTest(unittest.TestCase):
         self.assertEqual(known.returncode, 2)
         self.assertIn("all of it is known", known.stderr)
 
-    def test_a_printed_board_needs_no_start_pose(self):
-        hand_held, board = self.root / "hand_held", self.root / "board.h5"
-        made = self.evpose("simulate", SCENARIO.with_name("board.yaml"), "-o", hand_held, "--duration", 3,
-                           *(word for setting in TINY for word in ("--set", setting)))
+    def hand_held(self, *settings):
+        """A recording before a board, without truth, and a start that is off; and the true chain."""
+        folder, start = self.root / "hand_held", self.root / "start.yaml"
+        made = self.evpose("simulate", SCENARIO.with_name("board.yaml"), "-o", folder, "--duration", 3,
+                           *(word for setting in (*TINY, *settings) for word in ("--set", setting)))
         self.assertEqual(made.returncode, 0, made.stderr)
-        self.assertEqual(self.evpose("map", "board", "--checkerboard", "9x7", "--square", 0.08, "-o", board).returncode, 0)
-        truth = (hand_held / "camchain-imucam.yaml").read_text()
+        truth = (folder / "camchain-imucam.yaml").read_text()
         for name in ("groundtruth.tum", "groundtruth_camera.tum", "contours.ply"):
-            (hand_held / name).unlink()
+            (folder / name).unlink()
         fx, fy, cx, cy = numbers(truth, "intrinsics")
-        start = self.root / "start.yaml"
         start.write_text(re.sub(r".*_sigma: .*\n", "", re.sub(
             r"distortion_coeffs: \[.*\]", "distortion_coeffs: [0, 0, 0, 0]", re.sub(
                 r"intrinsics: \[.*\]", f"intrinsics: [{1.1 * fx}, {1.1 * fy}, {cx + 10}, {cy - 10}]", truth))))
-        words = ("calibrate", hand_held, "--map", board, "--start", start, "-o", self.root / "found.yaml")
-        done = self.evpose(*words)
-        if "without OpenCV" in done.stderr:
+        return folder, start, truth
+
+    def found_before_board(self, folder, start, truth, focal, *board):
+        """Within its sigmas, and the focal length within that share; the board's map."""
+        path = self.root / "board.h5"
+        self.assertEqual(self.evpose("map", "board", *board, "-o", path).returncode, 0)
+        done = self.evpose("calibrate", folder, "--map", path, "--start", start, "-o", self.root / "found.yaml")
+        if "was built without" in done.stderr:
             self.skipTest(done.stderr.strip())
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("warning", done.stderr)
@@ -95,7 +100,17 @@ class CalibrateTest(unittest.TestCase):
             sigmas = numbers(chain, key.replace("_coeffs", "") + "_sigma")
             for found, sigma, number in zip(numbers(chain, key), sigmas, numbers(truth, key)):
                 self.assertLess(abs(found - number), 4 * sigma)
-        self.assertLess(abs(numbers(chain, "intrinsics")[0] / fx - 1), 0.005)
+        self.assertLess(abs(numbers(chain, "intrinsics")[0] / numbers(truth, "intrinsics")[0] - 1), focal)
+        return path
+
+    def test_a_grid_of_tags_needs_no_start_pose(self):
+        folder, start, truth = self.hand_held(f"scene_file={april_grid.write_scene(self.root)}")
+        self.found_before_board(folder, start, truth, 0.02, "--aprilgrid", f"{april_grid.COLUMNS}x{april_grid.ROWS}", "--tag",
+                                april_grid.TAG_M)
+
+    def test_a_printed_board_needs_no_start_pose(self):
+        folder, start, truth = self.hand_held()
+        board = self.found_before_board(folder, start, truth, 0.005, "--checkerboard", "9x7", "--square", 0.08)
         hall = self.root / "hall"
         self.assertEqual(self.evpose("simulate", SCENARIO, "-o", hall, "--duration", 0.5,
                                      *(word for setting in TINY for word in ("--set", setting))).returncode, 0)

@@ -43,7 +43,7 @@ struct BoardStart {
 
 /// All recordings with the intrinsics of the first, which are known to within `sigma`. `progress` is told the
 /// share of the work and ends it by false; then there is no result. Errors: an unreadable recording; a board
-/// that is never seen whole, or whose points fit no camera; a program without OpenCV.
+/// that is never seen, or whose points fit no camera; a program without the library that finds it.
 Expected<std::optional<BoardStart>> find_board_start(const std::vector<Recording>& recordings,
                                                      const Board& board, const CameraIntrinsics& given,
                                                      const CalibrationSigma& sigma,

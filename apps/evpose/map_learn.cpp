@@ -23,7 +23,7 @@ using map_learn::FlightReport;
 
 struct LearnRequest {
   std::string map, output = "learnt.h5";
-  std::vector<std::string> recordings;
+  std::vector<std::string> recordings, runs;
   std::string trajectories;  ///< folder for the adjusted flights; empty: none
   TrackRequest flight;       ///< settings of all
 };
@@ -74,8 +74,12 @@ Status write_trajectory(const std::string& folder, const map_learn::LearntMap& l
   return write_tum(text(folder, "/flight_", number, ".tum"), poses);
 }
 
-/// What would be lost, or cannot be written.
-Status check_output(const LearnRequest& request) {
+/// What would be lost, cannot be written, or does not belong together.
+Status check_request(const LearnRequest& request) {
+  if (!request.runs.empty() && request.runs.size() != request.recordings.size())
+    return Error{"--run",
+                 text("names ", request.runs.size(), " runs of ", request.recordings.size(), " recordings"),
+                 "give one for each recording, in their order, or none"};
   std::error_code ignored;
   if (std::filesystem::equivalent(request.map, request.output, ignored))
     return Error{request.output, "is the map that is learnt from", "give another file with -o"};
@@ -83,7 +87,7 @@ Status check_output(const LearnRequest& request) {
 }
 
 int learn(const LearnRequest& request) {
-  if (const auto ok = check_output(request); !ok) return bad_input(ok.error());
+  if (const auto ok = check_request(request); !ok) return bad_input(ok.error());
   auto map = read_contour_map(request.map);
   if (!map) return bad_input(map.error());
   const auto placement = read_map_placement(request.map);
@@ -95,9 +99,9 @@ int learn(const LearnRequest& request) {
   nlohmann::ordered_json flights = nlohmann::ordered_json::array();
   Progress progress("learning");
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
-    TrackRequest flight = request.flight;
-    flight.recording = request.recordings[i];
-    flight.map = request.map;
+    map_learn::Flight flight{request.flight, request.runs.empty() ? "" : request.runs[i]};
+    flight.request.recording = request.recordings[i];
+    flight.request.map = request.map;
     auto learnt = map_learn::learn_from_flight(flight, *map, [&](double share) {
       progress.at((static_cast<double>(i) + share) / static_cast<double>(request.recordings.size()));
       return !InterruptGuard::interrupted();
@@ -135,6 +139,8 @@ void add_map_learn(CLI::App& map, std::function<int()>& run) {
       ->required();
   command->add_option("-o,--output", request->output, "map file; a report is written beside it")
       ->capture_default_str();
+  command->add_option("--run", request->runs,
+                      "run folders of the recordings, made with this map: they are not tracked again");
   command->add_option("--trajectories", request->trajectories, "folder for the adjusted trajectories (TUM)");
   command->add_option("--calibration", request->flight.calibration,
                       "of all recordings; default: the one found with each");

@@ -68,7 +68,8 @@ Status check_view(const TrackJob& job, const std::vector<Update>& updates) {
 
 }  // namespace
 
-Status BatchEstimator::filter(const TrackRequest& request, const Progress& progress) {
+/// The filter at what is known of the parameters by now; they are made if there are none.
+Expected<std::unique_ptr<Tracker>> BatchEstimator::make_filter() {
   const TrackJob job = parameters_ ? at_present_values() : job_;
   TrackerSetup setup = job.setup;
   if (parameters_) setup.calibration_sigma = sigma_of(parameters_->calibration());
@@ -84,6 +85,12 @@ Status BatchEstimator::filter(const TrackRequest& request, const Progress& progr
   if (resolved.calibration.time_offset)
     resolved.calibration.start_time_sigma_s = job_.setup.calibration_sigma->of_time_s();
   if (!parameters_) parameters_ = std::make_shared<StaticParameters>(resolved);
+  return tracker;
+}
+
+Status BatchEstimator::filter(const TrackRequest& request, const Progress& progress) {
+  auto tracker = make_filter();
+  if (!tracker) return tracker.error();
   trajectory_ = {(*tracker)->state()};
   updates_.clear();
   (*tracker)->on_update([&](const Update& u) {
@@ -91,11 +98,29 @@ Status BatchEstimator::filter(const TrackRequest& request, const Progress& progr
     updates_.push_back(u);
   });
   const auto go_on = [&](double share) { return !(interrupted_ = !progress(share)); };
-  if (auto ok = feed_recording(job.recording, job.config, **tracker, go_on); !ok) return ok;
+  if (auto ok = feed_recording(at_present_values().recording, job_.config, **tracker, go_on); !ok) return ok;
   if (interrupted_) return {};
   parameters_->add(widened((*tracker)->calibration()));
   summary_ = summarise(job_, request, **tracker, (*tracker)->calibration());
   return check_view(job_, updates_);
+}
+
+Status BatchEstimator::begin_along(std::vector<FusionState> trajectory, const Calibration& found) {
+  constexpr double kTimes = 3;  // as in widened()
+  const FusionState& start = trajectory.front();
+  const Vector6d sigma = kTimes * start.covariance.diagonal().head<6>().cwiseSqrt();
+  begin_at({start.t, start.nav.T_map_body, start.nav.velocity, start.angular_rate},
+           {sigma.head<3>().maxCoeff(), sigma.tail<3>().maxCoeff()});
+  const auto tracker = make_filter();
+  if (!tracker) return tracker.error();
+  const Matrix15d known = (*tracker)->state().covariance;
+  for (FusionState& s : trajectory) s.covariance.bottomRightCorner<9, 9>() = known.bottomRightCorner<9, 9>();
+  trajectory.front().covariance = known;
+  trajectory.front().covariance.topLeftCorner<6, 6>() += (sigma.cwiseAbs2()).asDiagonal();
+  trajectory_ = std::move(trajectory);
+  updates_.clear();
+  parameters_->add(widened(found));
+  return {};
 }
 
 std::vector<Eigen::Vector3d> BatchEstimator::displacements() const {

@@ -40,6 +40,9 @@ class BatchEstimator {
   /// The filter's run, from what is known of the parameters by now. Error: a recording that cannot be read,
   /// or in which nothing comes into view.
   Status filter(const TrackRequest& request, const Progress& progress);
+  /// In place of filter(), what another run has estimated: the states at the start and at each update after
+  /// it, with the covariances of their poses, and the calibration. The start is the first state's.
+  Status begin_along(std::vector<FusionState> trajectory, const Calibration& found);
   /// One pass; by how much it has moved the poses and the calibration, in sigma: the larger of the poses' RMS
   /// and of the largest number of the calibration. Interrupted: nothing has changed.
   Expected<double> iterate(const TrackRequest& request, const Progress& progress);
@@ -68,6 +71,7 @@ class BatchEstimator {
   const TrackerSetup& followed() const { return followed_; }
 
  private:
+  Expected<std::unique_ptr<Tracker>> make_filter();
   Expected<std::unique_ptr<Tracker>> follow(const Progress& progress);
 
   TrackJob job_;

@@ -11,13 +11,13 @@
 #include "evpose/core/log.h"
 #include "evpose/map_learn/observe_flight.h"
 #include "evpose/map_learn/plane_events.h"
+#include "evpose/map_learn/tracked_run.h"
 
 namespace evpose::map_learn {
 namespace {
 
 constexpr int kSmoothings = 2;
-constexpr int kPasses = 3;             // of looking for markings and adjusting
-constexpr double kLeastTracked = 0.5;  // of a flight that is of this map
+constexpr int kPasses = 3;  // of looking for markings and adjusting
 constexpr double kDegree = 57.29577951;
 // A flight that tells less than this says nothing that the cloud does not know.
 constexpr double kLeastSpread_deg = 1;
@@ -26,13 +26,15 @@ constexpr double kWorstCommon_m = 0.01;
 /// One flight and a map on their way to each other.
 class FlightLearner {
  public:
-  FlightLearner(const TrackRequest& request, const ContourMap& map, const LearnProgress& progress)
-      : request_(request), learning_(map), progress_(progress) {}
+  FlightLearner(const Flight& flight, const ContourMap& map, const LearnProgress& progress)
+      : flight_(flight), request_(flight.request), learning_(map), progress_(progress) {}
 
   Expected<LearntMap> learn();
 
  private:
   Status prepare_flight(const ContourMap& map);
+  Status track(BatchEstimator& estimator);
+  Status take_run(BatchEstimator& estimator);
   Status smooth();
   Status find_markings_of_flight();
   Status adjust_once();
@@ -45,7 +47,9 @@ class FlightLearner {
     return !(interrupted_ = interrupted_ || !progress_(std::min(1.0, (steps_done_ + share) / kSteps)));
   }
 
-  const TrackRequest& request_;
+  const Flight& flight_;
+  TrackRequest request_;
+  std::optional<RunFiles> run_;  ///< if the flight was tracked before
   LearningMap learning_;
   const LearnProgress& progress_;
   std::optional<TrackJob> job_;
@@ -65,6 +69,12 @@ void FlightLearner::use(const ContourMap& map) {
 Status FlightLearner::prepare_flight(const ContourMap& map) {
   const auto asked = load_config(request_);
   if (!asked) return asked.error();
+  if (!flight_.run.empty()) {
+    auto run = read_run_of(flight_.run, request_.recording, request_.map);
+    if (!run) return run.error();
+    run_ = std::move(*run);
+    request_ = request_of(request_, *run_, states_of(*run_, asked->tracker.rate_hz).front());
+  }
   auto job = prepare(request_, *asked);
   if (!job) return job.error();
   if (!job->recording.has_imu)
@@ -74,21 +84,32 @@ Status FlightLearner::prepare_flight(const ContourMap& map) {
   return {};
 }
 
-Status FlightLearner::smooth() {
-  BatchEstimator estimator(*job_);
-  const auto progress = [&](double share) { return go_on(share); };
-  if (auto ok = estimator.filter(request_, progress); !ok) return ok;
+Status FlightLearner::track(BatchEstimator& estimator) {
+  if (auto ok = estimator.filter(request_, [&](double share) { return go_on(share); }); !ok) return ok;
   if (interrupted_) return {};
   const auto& updates = estimator.updates();
   const auto tracked = std::count_if(updates.begin(), updates.end(),
                                      [](const Update& u) { return u.health == Health::tracking; });
   report_.tracked = static_cast<double>(tracked) / static_cast<double>(updates.size());
-  report_.seconds = to_seconds(updates.back().t - updates.front().t);
   if (report_.tracked < kLeastTracked)
     return Error{request_.recording,
                  text("was tracked in ", std::lround(100 * report_.tracked),
                       " % of its time with this map; nothing can be learnt from it"),
                  "check that it was flown in the place of the map; evpose check says more"};
+  return {};
+}
+
+Status FlightLearner::take_run(BatchEstimator& estimator) {
+  report_.tracked = tracking_share(*run_);
+  const auto found = found_by(*run_, *job_);
+  return found ? estimator.begin_along(states_of(*run_, job_->config.tracker.rate_hz), *found)
+               : found.error();
+}
+
+Status FlightLearner::smooth() {
+  BatchEstimator estimator(*job_);
+  const auto progress = [&](double share) { return go_on(share); };
+  if (auto ok = run_ ? take_run(estimator) : track(estimator); !ok || interrupted_) return ok;
   start_ = estimator.trajectory().front();
   for (int pass = 0; pass < kSmoothings; ++pass) {
     ++steps_done_;
@@ -98,6 +119,7 @@ Status FlightLearner::smooth() {
   }
   ++steps_done_;
   trajectory_ = estimator.trajectory();
+  report_.seconds = to_seconds(trajectory_.back().t - trajectory_.front().t);
   learning_.displace(estimator.displacements());
   job_ = estimator.at_present_values();
   return {};
@@ -201,9 +223,9 @@ Expected<LearntMap> FlightLearner::learn() {
 
 }  // namespace
 
-Expected<LearntMap> learn_from_flight(const TrackRequest& request, const ContourMap& map,
+Expected<LearntMap> learn_from_flight(const Flight& flight, const ContourMap& map,
                                       const LearnProgress& progress) {
-  return FlightLearner(request, map, progress).learn();
+  return FlightLearner(flight, map, progress).learn();
 }
 
 }  // namespace evpose::map_learn

@@ -27,6 +27,12 @@ struct FlightReport {
   double common_rotation_sigma_rad = 0;
 };
 
+/// What is learnt from.
+struct Flight {
+  TrackRequest request;
+  std::string run;  ///< folder of a run that was tracked of it with the request's map; empty: to be tracked
+};
+
 /// What a pass over a flight is told, 0..1; false ends it.
 using LearnProgress = std::function<bool(double)>;
 
@@ -37,10 +43,10 @@ struct LearntMap {
   Trajectory trajectory;  ///< of the flight, as adjusted
 };
 
-/// Smooths the recording of `request` with `map` in place of the request's, finds markings on its planes, and
-/// adjusts trajectory, contours and markings together. Interrupted: an empty map. Errors: of the
-/// recording; no IMU; a flight that was lost, or that tells nothing.
-Expected<LearntMap> learn_from_flight(const TrackRequest& request, const ContourMap& map,
+/// Smooths the recording of the flight with `map` in place of the request's, finds markings on its planes,
+/// and adjusts trajectory, contours and markings together. Interrupted: an empty map. Errors: of the
+/// recording; no IMU; a run of something else; a flight that was lost, or that tells nothing.
+Expected<LearntMap> learn_from_flight(const Flight& flight, const ContourMap& map,
                                       const LearnProgress& progress);
 
 }  // namespace evpose::map_learn

@@ -11,6 +11,8 @@
 namespace evpose {
 namespace {
 
+using Json = nlohmann::json;
+
 constexpr std::size_t kMostBytes = std::size_t{4} << 30;
 
 Health health_of(std::string_view name, bool* known) {
@@ -37,6 +39,10 @@ RunRow run_row(CsvRow& row, bool* known) {
   out.T_map_body = {q.norm() > 0.5 ? q.normalized() : Eigen::Quaterniond::Identity(),
                     {row.number("x_m"), row.number("y_m"), row.number("z_m")}};
   out.velocity = {row.number("vx_m_s"), row.number("vy_m_s"), row.number("vz_m_s")};
+  out.gyro_bias = {row.number("gyro_bias_x_rad_s"), row.number("gyro_bias_y_rad_s"),
+                   row.number("gyro_bias_z_rad_s")};
+  out.accel_bias = {row.number("accel_bias_x_m_s2"), row.number("accel_bias_y_m_s2"),
+                    row.number("accel_bias_z_m_s2")};
   out.covariance = covariance_of(row);
   out.health = health_of(row.word("health"), known);
   out.reason = row.rest("reason");
@@ -62,19 +68,22 @@ Expected<std::vector<RunRow>> read_rows(const std::string& path) {
   return out;
 }
 
-Expected<RunInput> read_input(const std::string& path) {
+/// What summary.json says of the run.
+Status read_summary(const std::string& path, RunFiles& run) {
   const auto content = read_text_file(path, kMostBytes);
   if (!content) return content.error();
-  const auto json = nlohmann::json::parse(*content, nullptr, false);
+  const auto json = Json::parse(*content, nullptr, false);
   const auto input = json.is_object() ? json.find("input") : json.end();
   if (json.is_discarded() || !json.is_object())
     return Error{path, "is not as evpose writes it", "give a complete run folder"};
-  if (input == json.end() || !input->is_object()) return RunInput{};  // a live one
+  run.interrupted = json.value("interrupted", Json(false)) == true;
+  if (input == json.end() || !input->is_object()) return {};  // a live one
   const auto word = [&](const char* key) {
     const auto found = input->find(key);
     return found != input->end() && found->is_string() ? found->get<std::string>() : std::string();
   };
-  return RunInput{word("recording"), word("map"), word("calibration"), word("occluders")};
+  run.input = {word("recording"), word("map"), word("calibration"), word("occluders")};
+  return {};
 }
 
 double widest(const Matrix6d& covariance, int from) {
@@ -101,9 +110,7 @@ Expected<RunFiles> read_run_files(const std::string& folder) {
                  "give what evpose track -o wrote"};
   RunFiles out;
   out.folder = folder;
-  auto input = read_input(folder + "/summary.json");
-  if (!input) return input.error();
-  out.input = *std::move(input);
+  if (const auto ok = read_summary(folder + "/summary.json", out); !ok) return ok.error();
   out.calibration = folder + "/calibration.yaml";
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(out.calibration, ignored)) out.calibration = out.input.calibration;

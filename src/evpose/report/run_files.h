@@ -15,7 +15,9 @@ namespace evpose {
 struct RunRow {
   TimeNs t = 0;
   Pose T_map_body;
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< map frame, m/s
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    ///< map frame, m/s
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< m/s^2
   Matrix6d covariance = Matrix6d::Zero();  ///< translation in the map, rotation in the body; m, rad
   Health health = Health::waiting;
   std::string reason;
@@ -31,7 +33,8 @@ struct RunRow {
 struct RunFiles {
   std::string folder;
   RunInput input;
-  std::string calibration;  ///< the file to look with: what the run found, else what it was given
+  bool interrupted = false;  ///< before the recording's end
+  std::string calibration;   ///< the file to look with: what the run found, else what it was given
   std::vector<RunRow> rows;
 };
 

@@ -29,6 +29,7 @@ void add_map_build(CLI::App& map, std::function<int()>& run);
 void add_map_board(CLI::App& map, std::function<int()>& run);
 void add_map_merge(CLI::App& map, std::function<int()>& run);
 void add_map_compare(CLI::App& map, std::function<int()>& run);
+void add_map_changes(CLI::App& map, std::function<int()>& run);
 void add_map_learn(CLI::App& map, std::function<int()>& run);
 void add_convert(CLI::App& app, std::function<int()>& run);
 void add_info(CLI::App& app, std::function<int()>& run);

@@ -15,6 +15,7 @@
 #include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/run/progress.h"
 #include "interrupt.h"
+#include "map_changes.h"
 
 namespace evpose {
 namespace {
@@ -45,6 +46,8 @@ nlohmann::ordered_json as_json(const FlightReport& r) {
       {"kept_m", r.lengths.kept_m},
       {"moved_m", r.lengths.moved_m},
       {"struck_m", r.lengths.struck_m},
+      {"gone_m", r.lengths.gone_m},
+      {"silent_m", r.lengths.silent_m},
       {"new_m", r.lengths.new_m},
       {"view_spread_deg", r.view_spread_deg},
       {"delay_px", r.delay_px},
@@ -56,11 +59,12 @@ nlohmann::ordered_json as_json(const FlightReport& r) {
 void print_flight(const FlightReport& r) {
   std::printf(
       "flight     %s: %.1f s, tracked %.0f %%, contours seen from %.1f deg apart\n"
-      "contours   %.1f m moved, %.1f m struck out, %.1f m new on planes, %.1f m of the map not seen\n"
+      "contours   %.1f m moved, %.1f m struck out, %.1f m gone, %.1f m new on planes, %.1f m of the map not "
+      "told\n"
       "events     %.0f %% lie on contours, %.0f %% before\n"
       "frame      all together stand within %.1f mm (1 sigma) along %s, %.1f and %.1f mm across, %.3f deg\n",
       r.recording.c_str(), r.seconds, 100 * r.tracked, r.view_spread_deg, r.lengths.moved_m,
-      r.lengths.struck_m, r.lengths.new_m, r.lengths.kept_m, 100 * r.explained_after,
+      r.lengths.struck_m, r.lengths.gone_m, r.lengths.new_m, r.lengths.kept_m, 100 * r.explained_after,
       100 * r.explained_before, 1e3 * r.common_sigma_m(0), axis_words(r.common_axes.col(0)).c_str(),
       1e3 * r.common_sigma_m(1), 1e3 * r.common_sigma_m(2), r.common_rotation_sigma_rad * 57.29577951);
   std::fflush(stdout);
@@ -95,6 +99,7 @@ int learn(const LearnRequest& request) {
   if (map->planes.empty() || map->polygons.empty())
     return bad_input({request.map, "has no planes: markings are learnt on planes",
                       "build the map from a cloud (evpose map build)"});
+  const ContourMap given = *map;
   const InterruptGuard guard;
   nlohmann::ordered_json flights = nlohmann::ordered_json::array();
   Progress progress("learning");
@@ -117,11 +122,11 @@ int learn(const LearnRequest& request) {
     *map = std::move(learnt->map);
   }
   if (const auto ok = write_map_h5(request.output, *map, "", *placement); !ok) return bad_input(ok.error());
-  const nlohmann::ordered_json report{{"map", request.map},
-                                      {"output", request.output},
-                                      {"flights", flights},
-                                      {"processor_s", cpu_s()},
-                                      {"peak_memory_mb", peak_memory_mb()}};
+  const map_learn::MapChanges changes = map_learn::compare_dates(given, *map);
+  std::printf("%s", words_of(changes).c_str());
+  const nlohmann::ordered_json report{{"map", request.map},     {"output", request.output},
+                                      {"flights", flights},     {"changes", json_of(changes)},
+                                      {"processor_s", cpu_s()}, {"peak_memory_mb", peak_memory_mb()}};
   if (const auto ok = write_text_file(request.output + ".json", report.dump(2) + "\n"); !ok)
     return bad_input(ok.error());
   std::printf("output     %s; report in %s.json\n", request.output.c_str(), request.output.c_str());

@@ -32,7 +32,7 @@ LearningMap::LearningMap(const ContourMap& given) : map_(given) {
   std::int32_t next = next_contour();
   for (ContourPoint& p : map_.points) {
     if (p.contour < 0 && p.kind == ContourKind::marking) p.contour = next++;
-    records_.push_back({p.position, p.sigma, false, false});
+    records_.push_back({p.position, p.sigma, false, false, p.contrast != 0, false});
   }
 }
 
@@ -50,7 +50,7 @@ void LearningMap::displace(const std::vector<Eigen::Vector3d>& displacements) {
 void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
   for (const ContourPoint& p : points) {
     map_.points.push_back(p);
-    records_.push_back({p.position, p.sigma, true, false});
+    records_.push_back({p.position, p.sigma, true, false, false, false});
   }
 }
 
@@ -128,7 +128,10 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     Record& record = records_[i];
     const bool marking = p.kind == ContourKind::marking;
     const LandmarkEstimate& e = result.landmarks[s];
-    const Verdict verdict = judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
+    record.silent = observed.silent[s];
+    const bool vanished = record.silent && record.told_before;
+    const Verdict verdict =
+        vanished ? Verdict::wrong : judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
     if (verdict == Verdict::good) {
       take(e, unknowns[s], i);
       p.contrast = observed.map.points[i].contrast;
@@ -136,7 +139,7 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
       p.position = record.given;
     }
     gone[i] = verdict == Verdict::wrong || (record.is_new && verdict == Verdict::untold);
-    if (gone[i] && !record.is_new) struck_m_ += static_cast<double>(p.length);
+    if (gone[i] && !record.is_new) (vanished ? gone_m_ : struck_m_) += static_cast<double>(p.length);
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < map_.points.size(); ++i)
@@ -148,9 +151,11 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
 LearntLengths LearningMap::lengths() const {
   LearntLengths out;
   out.struck_m = struck_m_;
+  out.gone_m = gone_m_;
   for (std::size_t i = 0; i < map_.points.size(); ++i) {
     const auto length = static_cast<double>(map_.points[i].length);
     (records_[i].is_new ? out.new_m : records_[i].was_told ? out.moved_m : out.kept_m) += length;
+    if (records_[i].silent && !records_[i].was_told && !records_[i].is_new) out.silent_m += length;
   }
   return out;
 }

@@ -16,6 +16,8 @@ struct LearntLengths {
   double kept_m = 0;    ///< of the given map, not seen well enough to say anything
   double moved_m = 0;   ///< of the given map, told anew by events
   double struck_m = 0;  ///< of the given map, contradicted by events
+  double gone_m = 0;    ///< of the given map, had told its contrast before and was seen without events
+  double silent_m = 0;  ///< of kept_m: seen without events, but never known to tell any
   double new_m = 0;     ///< markings that were learnt
 };
 
@@ -33,7 +35,8 @@ class LearningMap {
 
   /// The contrast segments of map() as unknowns, with what was known of each before this flight.
   std::vector<Landmark> landmarks(const ContourSegments& segments) const;
-  /// Moves contours; strikes those out that the events contradict, and markings that are not sure.
+  /// Moves contours; strikes those out that the events contradict, or that had
+  /// events before and have none now, and markings that are not sure.
   /// `observed`: of map() as it is now, in the order of the result's landmarks.
   void apply(const AdjustmentResult& result, const ContourSegments& segments,
              const FlightObservations& observed);
@@ -46,14 +49,16 @@ class LearningMap {
   struct Record {
     Eigen::Vector3f given = Eigen::Vector3f::Zero();  ///< where it was before this flight
     float given_sigma = 0;
-    bool is_new = false;    ///< a marking of this flight
-    bool was_told = false;  ///< by events of this flight
+    bool is_new = false;       ///< a marking of this flight
+    bool was_told = false;     ///< by events of this flight
+    bool told_before = false;  ///< its contrast is known from before this flight
+    bool silent = false;       ///< as last seen
   };
   void take(const LandmarkEstimate& estimate, const Landmark& landmark, std::size_t point);
 
   ContourMap map_;
   std::vector<Record> records_;
-  double struck_m_ = 0;
+  double struck_m_ = 0, gone_m_ = 0;
 };
 
 }  // namespace evpose::map_learn

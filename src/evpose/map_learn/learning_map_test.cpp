@@ -58,6 +58,7 @@ LandmarkEstimate good(double move_m) {
 /// `contrast`: of all points, as the events told.
 FlightObservations seen(const LearningMap& map, std::int8_t contrast) {
   FlightObservations out;
+  out.silent.assign(cut_into_segments(map.map()).count, false);
   out.map = map.map();
   for (ContourPoint& p : out.map.points) p.contrast = contrast;
   return out;
@@ -116,6 +117,21 @@ TEST(LearningMap, AContourThatItsEventsContradictIsStruckOut) {
   ASSERT_EQ(map.map().points.size(), 10u);
   EXPECT_EQ(map.map().points[0].contour, 1);
   EXPECT_NEAR(map.lengths().struck_m, 0.1, 1e-6);
+}
+
+TEST(LearningMap, OnlyAContourThatHadEventsBeforeIsGoneWithoutThem) {
+  ContourMap given = two_rims();
+  for (std::size_t i = 0; i < 10; ++i) given.points[i].contrast = 1;
+  LearningMap map(given);
+  const ContourSegments segments = cut_into_segments(map.map());
+  FlightObservations observed = seen(map, 0);
+  observed.silent.assign(2, true);
+  map.apply(nothing_told(2), segments, observed);
+  ASSERT_EQ(map.map().points.size(), 10u);
+  EXPECT_EQ(map.map().points[0].contour, 1);
+  EXPECT_NEAR(map.lengths().gone_m, 0.1, 1e-6);
+  EXPECT_NEAR(map.lengths().silent_m, 0.1, 1e-6);
+  EXPECT_NEAR(map.lengths().struck_m, 0, 1e-6);
 }
 
 TEST(LearningMap, AMarkingStaysIfEventsTellItsPlaceAndContrast) {

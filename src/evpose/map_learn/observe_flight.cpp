@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "evpose/fusion/back_end.h"
+#include "evpose/map_learn/silent_contours.h"
 
 namespace evpose::map_learn {
 namespace {
@@ -152,6 +153,14 @@ void take_sums(const ObservingBackEnd::Log& log, const Trajectory& trajectory, F
   }
 }
 
+std::vector<bool> find_silent(const TrackJob& job, const Trajectory& trajectory,
+                              const ObservingBackEnd::Log& log) {
+  const std::vector<double> swept_px = swept_pixels(job, trajectory);
+  std::vector<double> events(swept_px.size(), 0);
+  for (const auto& [key, sum] : log.sums) events[key.first] += sum.weight;
+  return silent_segments(swept_px, events);
+}
+
 }  // namespace
 
 Expected<FlightObservations> observe_flight(const TrackJob& job, const Trajectory& trajectory,
@@ -182,6 +191,7 @@ Expected<FlightObservations> observe_flight(const TrackJob& job, const Trajector
   out.explained = matched / std::max(1.0, read);
   out.steps = steps_between(trajectory, out.knots, *propagator, log.imu);
   take_sums(log, trajectory, out);
+  out.silent = find_silent(job, trajectory, log);
   out.map = (*tracker)->map_with_learnt_contrast();
   return out;
 }

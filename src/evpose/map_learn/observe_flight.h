@@ -17,6 +17,7 @@ struct FlightObservations {
   std::vector<KnotStep> steps;            ///< what the IMU says between two of them
   std::vector<Observation> observations;  ///< `landmark` is the segment; in order of it, then of time
   std::vector<Eigen::Vector3d> views;     ///< of each observation: unit, from the contour to the camera
+  std::vector<bool> silent;               ///< segments that were seen well enough, and told hardly any event
   ContourMap map;                         ///< with the contrast that the events have told
   double explained = 0;                   ///< share of the events that lie on contours
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/report/run_files.h"
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>

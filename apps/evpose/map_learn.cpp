@@ -9,12 +9,15 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "evpose/core/version.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/map_h5.h"
 #include "evpose/io/motion/trajectory_tum.h"
+#include "evpose/map_learn/tracked_run.h"
 #include "evpose/run/progress.h"
 #include "interrupt.h"
+#include "learnt_flights.h"
 #include "map_changes.h"
 
 namespace evpose {
@@ -85,9 +88,125 @@ Status check_request(const LearnRequest& request) {
                  text("names ", request.runs.size(), " runs of ", request.recordings.size(), " recordings"),
                  "give one for each recording, in their order, or none"};
   std::error_code ignored;
+  const auto folder = std::filesystem::absolute(request.output, ignored).parent_path();
+  if (!std::filesystem::is_directory(folder, ignored))
+    return Error{request.output, "its folder does not exist", "make it first"};
+  for (const std::string& recording : request.recordings)
+    if (!std::filesystem::exists(recording, ignored))
+      return Error{recording, "does not exist", "give recordings that are there"};
   if (std::filesystem::equivalent(request.map, request.output, ignored))
     return Error{request.output, "is the map that is learnt from", "give another file with -o"};
   return {};
+}
+
+/// One learning, flight after flight.
+class Learning {
+ public:
+  Learning(const LearnRequest& request, ContourMap map, const MapPlacement& placement)
+      : request_(request),
+        given_(map),
+        map_(std::move(map)),
+        placement_(placement),
+        kept_(request.output, placement) {}
+
+  /// The exit status.
+  int run();
+
+ private:
+  Status learn_from(std::size_t number);
+  Status write_results();
+  nlohmann::ordered_json inputs_until(std::size_t number) const;
+
+  const LearnRequest& request_;
+  const ContourMap given_;
+  ContourMap map_;
+  MapPlacement placement_;
+  LearntFlights kept_;
+  nlohmann::ordered_json flights_ = nlohmann::ordered_json::array();
+  Progress progress_{"learning"};
+};
+
+/// All that the map after this flight depends on.
+nlohmann::ordered_json Learning::inputs_until(std::size_t number) const {
+  std::error_code ignored;
+  const auto path = [](const std::string& p) {
+    return p.empty() ? p : std::filesystem::absolute(p).lexically_normal().string();
+  };
+  nlohmann::ordered_json out{
+      {"evpose", version()},
+      {"map", path(request_.map)},
+      {"map_bytes", std::filesystem::file_size(request_.map, ignored)},
+      {"map_time", std::filesystem::last_write_time(request_.map, ignored).time_since_epoch().count()},
+      {"calibration", path(request_.flight.calibration)},
+      {"init", request_.flight.init}};
+  ConfigTable table;
+  if (auto config = load_config(request_.flight)) {
+    describe(table, *config);
+    out["config"] = table.to_yaml();
+  }
+  for (std::size_t i = 0; i <= number; ++i) {
+    out["recordings"].push_back(path(request_.recordings[i]));
+    if (!request_.runs.empty()) out["runs"].push_back(path(request_.runs[i]));
+  }
+  return out;
+}
+
+Status Learning::learn_from(std::size_t number) {
+  map_learn::Flight flight{request_.flight, request_.runs.empty() ? "" : request_.runs[number]};
+  flight.request.recording = request_.recordings[number];
+  flight.request.map = request_.map;
+  const auto flights = static_cast<double>(request_.recordings.size());
+  auto learnt = map_learn::learn_from_flight(flight, map_, [&](double share) {
+    progress_.at((static_cast<double>(number) + share) / flights);
+    return !InterruptGuard::interrupted();
+  });
+  if (!learnt) return learnt.error();
+  if (InterruptGuard::interrupted()) return {};
+  progress_.done();
+  print_flight(learnt->report);
+  flights_.push_back(as_json(learnt->report));
+  if (!request_.trajectories.empty())
+    if (auto ok = write_trajectory(request_.trajectories, *learnt, number); !ok) return ok;
+  map_ = std::move(learnt->map);
+  if (number + 1 == request_.recordings.size()) return {};
+  auto kept = kept_.keep(number, inputs_until(number), flights_.back(), map_);
+  if (!kept) return kept.error();
+  map_ = *std::move(kept);
+  map_.source = given_.source;
+  return {};
+}
+
+Status Learning::write_results() {
+  if (auto ok = write_map_h5(request_.output, map_, "", placement_); !ok) return ok;
+  const map_learn::MapChanges changes = map_learn::compare_dates(given_, map_);
+  std::printf("%s", words_of(changes).c_str());
+  const nlohmann::ordered_json report{{"map", request_.map},    {"output", request_.output},
+                                      {"flights", flights_},    {"changes", json_of(changes)},
+                                      {"processor_s", cpu_s()}, {"peak_memory_mb", peak_memory_mb()}};
+  if (auto ok = write_text_file(request_.output + ".json", report.dump(2) + "\n"); !ok) return ok;
+  kept_.remove();
+  std::printf("output     %s; report in %s.json\n", request_.output.c_str(), request_.output.c_str());
+  return {};
+}
+
+int Learning::run() {
+  const InterruptGuard guard;
+  for (std::size_t i = 0; i < request_.recordings.size(); ++i) {
+    if (auto done = kept_.read(i, inputs_until(i)); done && i + 1 < request_.recordings.size()) {
+      std::printf("flight     %s: done before\n", request_.recordings[i].c_str());
+      flights_.push_back(done->report);
+      map_ = std::move(done->map);
+      map_.source = given_.source;
+      continue;
+    }
+    if (const auto ok = learn_from(i); !ok) return bad_input(ok.error());
+    if (!InterruptGuard::interrupted()) continue;
+    if (kept_.any())
+      std::fprintf(stderr, "evpose: interrupted; the same command goes on after the flights that are done\n");
+    return kInterruptedStatus;
+  }
+  const auto ok = write_results();
+  return ok ? 0 : bad_input(ok.error());
 }
 
 int learn(const LearnRequest& request) {
@@ -99,38 +218,10 @@ int learn(const LearnRequest& request) {
   if (map->planes.empty() || map->polygons.empty())
     return bad_input({request.map, "has no planes: markings are learnt on planes",
                       "build the map from a cloud (evpose map build)"});
-  const ContourMap given = *map;
-  const InterruptGuard guard;
-  nlohmann::ordered_json flights = nlohmann::ordered_json::array();
-  Progress progress("learning");
-  for (std::size_t i = 0; i < request.recordings.size(); ++i) {
-    map_learn::Flight flight{request.flight, request.runs.empty() ? "" : request.runs[i]};
-    flight.request.recording = request.recordings[i];
-    flight.request.map = request.map;
-    auto learnt = map_learn::learn_from_flight(flight, *map, [&](double share) {
-      progress.at((static_cast<double>(i) + share) / static_cast<double>(request.recordings.size()));
-      return !InterruptGuard::interrupted();
-    });
-    if (InterruptGuard::interrupted()) return kInterruptedStatus;
-    if (!learnt) return bad_input(learnt.error());
-    progress.done();
-    print_flight(learnt->report);
-    flights.push_back(as_json(learnt->report));
-    if (!request.trajectories.empty())
-      if (const auto ok = write_trajectory(request.trajectories, *learnt, i); !ok)
-        return bad_input(ok.error());
-    *map = std::move(learnt->map);
-  }
-  if (const auto ok = write_map_h5(request.output, *map, "", *placement); !ok) return bad_input(ok.error());
-  const map_learn::MapChanges changes = map_learn::compare_dates(given, *map);
-  std::printf("%s", words_of(changes).c_str());
-  const nlohmann::ordered_json report{{"map", request.map},     {"output", request.output},
-                                      {"flights", flights},     {"changes", json_of(changes)},
-                                      {"processor_s", cpu_s()}, {"peak_memory_mb", peak_memory_mb()}};
-  if (const auto ok = write_text_file(request.output + ".json", report.dump(2) + "\n"); !ok)
-    return bad_input(ok.error());
-  std::printf("output     %s; report in %s.json\n", request.output.c_str(), request.output.c_str());
-  return 0;
+  for (std::size_t i = 0; i < request.runs.size(); ++i)
+    if (const auto run = map_learn::read_run_of(request.runs[i], request.recordings[i], request.map); !run)
+      return bad_input(run.error());
+  return Learning(request, *std::move(map), *placement).run();
 }
 
 }  // namespace

@@ -110,12 +110,12 @@ Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool c
 
 }  // namespace
 
-void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, std::size_t i) {
-  ContourPoint& p = map_.points[i];
+void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, std::size_t point) {
+  ContourPoint& p = map_.points[point];
   p.position += (l.directions * e.move_m).cast<float>();
   const double elsewhere = kViewChange * kViewChange * e.covariance.trace();
   p.sigma = static_cast<float>(std::sqrt(e.seen_variance_m2 + elsewhere + kFloor_m * kFloor_m));
-  records_[i].was_told = true;
+  records_[point].was_told = true;
 }
 
 void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& segments,

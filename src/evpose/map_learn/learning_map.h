@@ -54,7 +54,7 @@ class LearningMap {
     bool told_before = false;  ///< its contrast is known from before this flight
     bool silent = false;       ///< as last seen
   };
-  void take(const LandmarkEstimate& estimate, const Landmark& landmark, std::size_t point);
+  void take(const LandmarkEstimate& e, const Landmark& l, std::size_t point);
 
   ContourMap map_;
   std::vector<Record> records_;

@@ -397,5 +397,9 @@ SECTIONS = {
         Situation("Discs that touch", "map board --circles 4x11 --distance 0.02 --diameter 0.05 -o new.h5", 2, ["touch", "diameter"]),
         Situation("Learning from a map without planes", "map learn map.h5 flight -o new.h5", 2, ["map.h5", "no planes", "evpose map build"]),
         Situation("Learning over the map itself", "map learn map.h5 flight -o map.h5", 2, ["map.h5", "learnt from", "another"]),
+        Situation("Learning from a flight that is not there", "map learn map.h5 nowhere -o new.h5", 2, ["nowhere", "not exist"]),
+        Situation("Learning from more runs than flights", "map learn map.h5 flight -o new.h5 --run run run", 2, ["--run", "2 runs of 1", "one for each"]),
+        Situation("Learning into no folder", "map learn map.h5 flight -o nowhere/new.h5", 2, ["nowhere/new.h5", "folder", "make it"]),
+        Situation("Changes to a map that is not there", "map changes map.h5 nowhere.h5", 2, ["nowhere.h5"]),
     ],
 }

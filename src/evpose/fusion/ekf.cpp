@@ -71,13 +71,20 @@ FusionState Ekf::reported_state() const {
 }
 
 /// Adds what the contours say about the blocks that they depend on one by one, and what errors they share.
+/// One whose segment finds no state says nothing.
 void Ekf::add_contours(std::span<const ContourOffset> contours) {
   const Eigen::Matrix3d R = state().nav.T_map_body.rotation();
   std::array<BlockRow, 2> rows;
   for (const ContourOffset& contour : contours) {
     std::size_t n = 0;
-    if (offsets_)
-      if (const auto row = offsets_->row_of(contour, filter_)) rows[n++] = *row;
+    if (offsets_) {
+      const auto row = offsets_->row_of(contour, filter_);
+      if (!row) {
+        measurement_.withdraw(contour.by_pose(R), contour.weight, contour.offset_px);
+        continue;
+      }
+      rows[n++] = *row;
+    }
     if (const auto row = calibration_.row_of(contour)) rows[n++] = *row;
     const BlockSample sample{contour.by_pose(R), contour.weight, contour.offset_px, {rows.data(), n}};
     if (n > 0) measurement_.add(sample);

@@ -69,6 +69,11 @@ void JointMeasurement::add(const BlockSample& s) {
   }
 }
 
+void JointMeasurement::withdraw(const Vector6d& by_pose, double weight, double residual) {
+  information_.topLeftCorner<6, 6>() -= weight * by_pose * by_pose.transpose();
+  vector_.head<6>() -= weight * residual * by_pose;
+}
+
 void JointMeasurement::add_block(BlockId id, const Eigen::MatrixXd& information,
                                  const Eigen::VectorXd& vector) {
   const auto n = static_cast<int>(vector.size()) - 6;

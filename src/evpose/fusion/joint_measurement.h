@@ -47,6 +47,9 @@ class JointMeasurement {
   /// already.
   void add(const BlockSample& sample);
 
+  /// Takes out a sample's share of the pose's own information and vector.
+  void withdraw(const Vector6d& by_pose, double weight, double residual);
+
   /// Adds what is known of one block together with the pose: information and vector of both, the pose first.
   /// Its share of the pose's own is in there already.
   void add_block(BlockId id, const Eigen::MatrixXd& information, const Eigen::VectorXd& vector);

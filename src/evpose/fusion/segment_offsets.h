@@ -16,7 +16,7 @@ namespace evpose {
 /// texture that moves with it is taken for it. An offset is one length, along the direction in the map across
 /// which the segment was seen first; with a view from elsewhere it counts by the cosine. Offsets do not
 /// change while a segment is in view; when there are more segments than states, the one not seen for longest
-/// gives way, and what finds no state counts without an offset.
+/// gives way, and what finds no state does not count.
 class SegmentOffsets {
  public:
   explicit SegmentOffsets(const SegmentOffsetConfig& config) : config_(config) {}

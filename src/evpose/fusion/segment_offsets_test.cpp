@@ -189,6 +189,19 @@ TEST(SegmentOffsets, TheSegmentNotSeenForLongestGivesWay) {
   EXPECT_TRUE(filter.state().covariance.allFinite());
 }
 
+TEST(SegmentOffsets, ASegmentWithoutAStateSaysNothing) {
+  Ekf one(some_propagator(), some_config(1)), both(some_propagator(), some_config(1));
+  const auto contours = some_contours(2);
+  const std::vector<ContourOffset> first(contours.begin(), contours.begin() + 4);
+  for (Ekf* filter : {&one, &both}) {
+    filter->start(0, some_state(), {0, 0, 0});
+    measure(*filter, filter == &one ? first : contours);
+  }
+  const Matrix15d& P = one.state().covariance;
+  EXPECT_LT((both.state().covariance - P).norm(), 1e-9 * P.norm());
+  EXPECT_LT(one.state().nav.T_map_body.minus(both.state().nav.T_map_body).norm(), 1e-12);
+}
+
 TEST(SegmentOffsets, AreStatesWhereTheMapStatesErrorsBesideAnyCalibration) {
   FusionConfig config;
   EXPECT_EQ(resolved(config, true)->segment_offsets, SegmentOffsetUse::on);

@@ -6,42 +6,34 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <random>
+#include <unordered_map>
 #include <utility>
 
-#include "evpose/registration/edge_field.h"
-#include "evpose/registration/pose_search.h"
-#include "evpose/tracker/event_slice.h"
+#include "evpose/tracker/contour_profiles.h"
 
 namespace evpose {
 namespace {
 
 // From the errors of an ordinary calibration to the gate of the tracker.
-constexpr std::array<double, 7> kGates_px{4, 3, 2, 1.4, 1, 0.7, 0.5};
+constexpr std::array<double, 5> kGates_px{2, 1.4, 1, 0.7, 0.5};
 constexpr int kStepsPerGate = 4;           // of Gauss-Newton, each with a new association
 constexpr double kScatterOfGate = 0.7;     // sigma of the events under a gate, but for the tracker's
 constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band is wider than its gate
-constexpr double kNumbersFirst_px = 10;    // gates below which the camera's numbers are free: all,
-constexpr double kPoseFirst_px = 1.7;      // or the narrow ones
-constexpr double kHeld = 1e12;             // factor on the prior's information that holds the numbers
 // Chance gives no concentration at all, a wrong view some. How much the right one gives depends on the
 // texture beside the contours. So much is the right one's, if several starting points or the next events lead
 // to it as well:
-constexpr double kHighConcentration = 0.42, kFewAgree = 0.4;
+constexpr double kHighConcentration = 0.42, kFewAgree = 0.4, kAlone = 1.5;
 // With less, most starting points have to lead to one view, and its contours have to have events.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2, kConfirmedWithin = 4;  // sigma
-constexpr int kDraws = 10;                             // further starting points where these do not agree
-constexpr unsigned kSeed = 1;
-constexpr double kEdge_m = 0.6;         // an edge whose events share errors
-constexpr double kEdgeSigma_px = 0.15;  // of such an error; one degree of freedom
+constexpr double kEdge_m = 0.6;                        // an edge whose events share errors
+constexpr double kEdgeSigma_px = 0.15;  // of such an error, beside the map's; one degree of freedom
 
 // Points to refine with, and to search with.
-constexpr double kPointStride_px = 4, kSearchStride_px = 8, kSearchMargin_px = 40;
-constexpr int kPoints = 3000, kSearchPoints = 700;
-constexpr std::size_t kSearched = 4;  // poses that are tried beside the prior's
-constexpr std::size_t kSearchEvents = 20000;
-constexpr double kSearchSpan_s = 0.02;  // contours move little in it
+constexpr double kPointStride_px = 4, kSearchStride_px = 6, kSearchMargin_px = 40;
+constexpr int kPoints = 3000, kSearchPoints = 1500;
+constexpr std::size_t kBegins = 8;
+constexpr double kReach_sigma = 3, kMostReach_px = 32;  // of profiles
 
 VisibleSetConfig points_to_refine(VisibleSetConfig config) {
   config.stride_px = kPointStride_px;
@@ -110,35 +102,61 @@ double StartAlignment::expected_offset_px(const SeenPrior& prior, std::span<cons
   return samples.empty() ? 0 : std::sqrt(sum / static_cast<double>(samples.size()));
 }
 
-/// The prior's pose, and others that edges of the newest events suggest.
-std::vector<Pose> StartAlignment::first_guesses(const SeenPrior& prior, const Pose& T_body_cam) const {
-  std::vector<Pose> out{prior.nav.T_map_body};
-  std::vector<FilteredEvent> events, compensated;
-  double span_s = 0;
-  for (std::size_t k = 0; k < intervals_.size() && events.size() < kSearchEvents && span_s < kSearchSpan_s;
-       ++k) {
-    events.insert(events.begin(), intervals_[k].events.begin(), intervals_[k].events.end());
-    span_s += intervals_[k].motion.dt_s;
+/// Derivatives of the samples' displacements across them by pose and numbers, a row for each slot.
+Eigen::MatrixXd StartAlignment::displacement_rows(const SeenPrior& prior, const Pose& T_body_cam,
+                                                  std::span<const std::uint32_t> slots,
+                                                  std::size_t count) const {
+  const Eigen::Index n = prior.numbers.size();
+  const Pose T_cam_map = (prior.nav.T_map_body * T_body_cam).inverse();
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(count), 6 + n);
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    const ContourSample& s = samples_[i];
+    auto row = rows.row(slots[i]);
+    row.head<6>() = -s.jacobian.transpose();
+    if (n == 0) continue;
+    if (const auto by_numbers = adjusted_->by_numbers(T_cam_map * index_.map().position(s.point)))
+      row.tail(n) = s.normal_px.transpose() * *by_numbers;
   }
-  const EventInterval& newest = intervals_[0];
-  const double age_s = 0.5 * span_s;
-  const Eigen::Vector3d rate_cam = T_body_cam.q.conjugate() * newest.angular_rate;
-  compensate_rotation(events, camera_, {rate_cam, newest.now_us, age_s}, compensated);
-  EdgeField field(camera_.size());
-  field.build(compensated);
-  const Camera& choosing = adjusted_ != nullptr ? adjusted_->given() : camera_;
-  VisibleSet visible(index_, choosing, points_to_search(visible_config_));
-  std::vector<SearchPoint> points;
-  for (const std::uint32_t i : visible.choose(prior.nav.T_map_body * T_body_cam))
-    points.push_back({index_.map().position(i), index_.map().points[i].tangent.cast<double>()});
-  if (points.empty()) return out;
-  const SearchView view{field, camera_, T_body_cam, points};
-  for (const PoseGuess& guess :
-       search_pose(view, prior.nav.T_map_body, prior.covariance.topLeftCorner<6, 6>(), 1)) {
-    if (out.size() > kSearched) break;
-    // The edges show where the body was age_s ago.
-    out.push_back({guess.T_map_body.q * so3::exp(age_s * newest.angular_rate),
-                   guess.T_map_body.p + age_s * prior.nav.velocity});
+  return rows;
+}
+
+/// Where errors of the prior would put the contours at most events.
+std::vector<StartAlignment::Begin> StartAlignment::begins(const SeenPrior& prior, const Pose& T_body_cam) {
+  const Eigen::Index n = prior.numbers.size();
+  std::vector<Eigen::Index> pose_and_numbers{0, 1, 2, 3, 4, 5};
+  for (Eigen::Index i = 0; i < n; ++i) pose_and_numbers.push_back(9 + i);
+  const Eigen::MatrixXd P = prior.covariance(pose_and_numbers, pose_and_numbers);
+  const Eigen::MatrixXd root = information_of(P).inverse().llt().matrixL();
+  const std::vector<std::uint32_t> points =
+      visible_from(prior.nav.T_map_body * T_body_cam, points_to_search(visible_config_));
+  std::unordered_map<std::uint32_t, std::uint32_t> slot_of;
+  for (const std::uint32_t point : points) slot_of.emplace(point, static_cast<std::uint32_t>(slot_of.size()));
+  const ContourView view{index_.map(), segments_, camera_, T_body_cam, registration_config_.map_sigma_m};
+  const PoseHypothesis newest{prior.nav};
+  NavState nav = prior.nav;
+  Eigen::MatrixXd rows;
+  std::optional<ContourProfiles> profiles;
+  for (std::size_t k = 0; k < intervals_.size(); ++k) {
+    const EventInterval& interval = intervals_[k];
+    const double span_s = interval.motion.dt_s;
+    project_contours(view, points, {nav.T_map_body, nav.velocity, interval.angular_rate}, span_s, samples_);
+    std::vector<std::uint32_t> slots;
+    for (const ContourSample& s : samples_) slots.push_back(slot_of.at(s.point));
+    if (!profiles) {
+      rows = displacement_rows(prior, T_body_cam, slots, points.size()) * root;
+      const double seen = std::max(1.0, static_cast<double>(samples_.size()));
+      const double reach_px = kReach_sigma * rows.norm() / std::sqrt(seen);
+      profiles.emplace(camera_.size(), points.size(), std::min(reach_px, kMostReach_px));
+    }
+    profiles->add(interval.events, interval.now_us, span_s, samples_, slots);
+    nav = motion_.propagate_back(newest, nav, interval.motion);
+  }
+  std::vector<Begin> out;
+  if (!profiles) return out;
+  profiles->finish();
+  for (const Eigen::VectorXd& z : most_gathering(*profiles, rows, kBegins)) {
+    const Eigen::VectorXd off = root * z;
+    out.push_back({prior.nav.T_map_body.plus(off.head<6>()), prior.numbers + off.tail(n)});
   }
   return out;
 }
@@ -166,18 +184,20 @@ void StartAlignment::add_offsets(const EventRegistration& registration, const Po
     edge.row += weight * row;
     edge.weight += offset.weight;
     edge.offset += weight * offset.offset_px;
+    edge.map_variance += offset.weight * s.map_sigma_px * s.map_sigma_px;
   }
 }
 
 /// Eliminates the error of each edge, and takes its next variance from what it has turned out to be.
 void StartAlignment::add_edges(const std::map<std::uint32_t, EdgeSum>& edges, Trial& trial) const {
-  constexpr double kVariance = kEdgeSigma_px * kEdgeSigma_px;
   for (const auto& [number, edge] : edges) {
-    double& variance = trial.edge_variances.try_emplace(number, kVariance).first->second;
+    if (!(edge.weight > 0)) continue;
+    const double ordinary = kEdgeSigma_px * kEdgeSigma_px + edge.map_variance / edge.weight;
+    double& variance = trial.edge_variances.try_emplace(number, ordinary).first->second;
     const double weight = edge.weight + 1 / variance, error = edge.offset / weight;
     trial.H.selfadjointView<Eigen::Lower>().rankUpdate(edge.row, -1 / weight);
     trial.b -= error * edge.row;
-    variance = 0.5 * (kVariance + error * error + 1 / weight);
+    variance = 0.5 * (ordinary + error * error + 1 / weight);
   }
   trial.H.triangularView<Eigen::StrictlyUpper>() = trial.H.transpose();
 }
@@ -218,21 +238,28 @@ void StartAlignment::look(const SeenPrior& prior, const Pose& T_body_cam,
   trial.support = trial.concentration * matched / std::max(1.0, asked);
 }
 
-/// From a pose, the other states as the prior has them. The camera's numbers are held above a gate.
-StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Begin& begin,
-                                             const Pose& T_body_cam, double numbers_below_px) {
-  const Eigen::Index n = prior.numbers.size(), all = 9 + n;
-  const Eigen::MatrixXd information = information_of(prior.covariance);
-  Trial trial;
-  trial.nav = prior.nav;
-  trial.nav.T_map_body = begin.T_map_body;
-  trial.numbers = begin.numbers;
-  trial.H.resize(all, all);
-  trial.b.resize(all);
-  trial.moved.resize(all);
+StartAlignment::Trial::Trial(const SeenPrior& prior, const Begin& begin)
+    : nav(prior.nav), numbers(begin.numbers) {
+  nav.T_map_body = begin.T_map_body;
+  const Eigen::Index all = 9 + numbers.size();
+  H.resize(all, all);
+  b.resize(all);
+  moved.resize(all);
+}
+
+std::vector<std::uint32_t> StartAlignment::visible_from(const Pose& T_map_cam,
+                                                        const VisibleSetConfig& config) const {
   const Camera& choosing = adjusted_ != nullptr ? adjusted_->given() : camera_;
-  VisibleSet visible(index_, choosing, points_to_refine(visible_config_));
-  const std::vector<std::uint32_t> points = visible.choose(begin.T_map_body * T_body_cam);
+  return VisibleSet(index_, choosing, config).choose(T_map_cam);
+}
+
+/// From a pose and numbers, the velocity as the prior has it.
+StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Begin& begin,
+                                             const Pose& T_body_cam) {
+  const Eigen::MatrixXd information = information_of(prior.covariance);
+  Trial trial(prior, begin);
+  const std::vector<std::uint32_t> points =
+      visible_from(begin.T_map_body * T_body_cam, points_to_refine(visible_config_));
   for (const double gate_px : kGates_px) {
     EventRegistration registration(camera_.size(), under_gate(registration_config_, gate_px),
                                    segments_.count);
@@ -241,12 +268,11 @@ StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Begin
       // The last look is at the aligned state: it only measures.
       if (gate_px == kGates_px.back() && step + 1 == kStepsPerGate) return trial;
       Eigen::MatrixXd H = trial.H + information;
-      if (gate_px > numbers_below_px) H.diagonal().tail(n) += kHeld * information.diagonal().tail(n);
       const Eigen::VectorXd d = H.ldlt().solve(trial.b - information * trial.moved);
       if (!d.allFinite()) return trial;
       trial.nav.T_map_body = trial.nav.T_map_body.plus(d.head<6>());
       trial.nav.velocity += d.segment<3>(6);
-      trial.numbers += d.tail(n);
+      trial.numbers += d.tail(trial.numbers.size());
     }
   }
   return trial;
@@ -264,42 +290,21 @@ SeenMeasurement StartAlignment::without_velocity(const SeenPrior& prior, const T
   return {trial.H(kept, kept) - gain * trial.H(velocity, kept), vector(kept) - gain * vector(velocity)};
 }
 
+bool StartAlignment::is_same(const Trial& a, const Trial& view) {
+  const Eigen::VectorXd d = a.moved - view.moved;
+  return d.dot(view.H * d) < kSameView * kSameView * static_cast<double>(d.size());
+}
+
 /// Share of the trials that led to the same view.
 double StartAlignment::agreement(std::span<const Trial> trials, const Trial& view) {
-  const auto agree = std::ranges::count_if(trials, [&](const Trial& other) {
-    const Eigen::VectorXd d = other.moved - view.moved;
-    return d.dot(view.H * d) < kSameView * kSameView * static_cast<double>(d.size());
-  });
+  const auto agree = std::ranges::count_if(trials, [&](const Trial& other) { return is_same(other, view); });
   return static_cast<double>(agree) / static_cast<double>(trials.size());
 }
 
-/// From the poses that the edges suggest.
-std::vector<StartAlignment::Trial> StartAlignment::try_guesses(const SeenPrior& prior,
-                                                               std::span<const Pose> guesses,
-                                                               const Pose& T_body_cam) {
-  std::vector<Trial> trials;
-  for (const Pose& from : guesses)
-    for (const double numbers_below_px : {kNumbersFirst_px, kPoseFirst_px}) {
-      if (numbers_below_px == kPoseFirst_px && prior.numbers.size() == 0) continue;
-      trials.push_back(anneal(prior, {from, prior.numbers}, T_body_cam, numbers_below_px));
-    }
-  return trials;
-}
-
-/// From numbers and poses that are drawn from the prior, and from drawn numbers and the suggested poses.
-void StartAlignment::try_drawn(const SeenPrior& prior, std::span<const Pose> guesses, const Pose& T_body_cam,
-                               std::vector<Trial>& trials) {
-  std::mt19937 random(kSeed);
-  std::normal_distribution<double> normal;
-  const Eigen::Index n = prior.numbers.size();
-  const Eigen::MatrixXd root = information_of(prior.covariance).inverse().llt().matrixL();
-  for (std::size_t draw = 0; draw < kDraws; ++draw) {
-    const Eigen::VectorXd off =
-        root * Eigen::VectorXd::NullaryExpr(root.rows(), [&] { return normal(random); });
-    const Pose from =
-        draw % 2 == 0 ? prior.nav.T_map_body.plus(off.head<6>()) : guesses[draw % guesses.size()];
-    trials.push_back(anneal(prior, {from, prior.numbers + off.tail(n)}, T_body_cam, kNumbersFirst_px));
-  }
+bool StartAlignment::is_alone(std::span<const Trial> trials, const Trial& view) {
+  return std::ranges::all_of(trials, [&](const Trial& other) {
+    return view.support > kAlone * other.support || is_same(other, view);
+  });
 }
 
 /// Whether this view is the one that the last call found. That began from the same prior, but for what the
@@ -312,28 +317,23 @@ bool StartAlignment::confirms_last(const Trial& view) {
   return d.dot(view.H * d) < kConfirmedWithin * kConfirmedWithin * static_cast<double>(d.size());
 }
 
-/// `agreeing`: share of the starting points that the prior suggests.
-bool StartAlignment::is_right(const Trial& view, double agreeing, bool confirmed) {
-  if (view.concentration >= kHighConcentration && (confirmed || agreeing >= kFewAgree)) return true;
+/// `agreeing`: share of the starting points that lead there; `alone`: no other view gathers nearly as many.
+bool StartAlignment::is_right(const Trial& view, double agreeing, bool alone, bool confirmed) {
+  if (view.concentration >= kHighConcentration && (confirmed || alone || agreeing >= kFewAgree)) return true;
   return view.concentration >= kLeastConcentration && view.support >= kLeastSupport &&
          agreeing >= kLeastAgreement;
 }
 
 std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {
-  const std::vector<Pose> guesses = first_guesses(prior, T_body_cam);
-  std::vector<Trial> trials = try_guesses(prior, guesses, T_body_cam);
-  const std::size_t suggested = trials.size();
-  const auto best = [&] { return std::ranges::max_element(trials, {}, &Trial::support); };
-  const auto agreeing = [&] { return agreement(std::span(trials).first(suggested), *best()); };
-  bool right = agreeing() >= kLeastAgreement && is_right(*best(), agreeing(), false);
-  if (!right) {
-    try_drawn(prior, guesses, T_body_cam, trials);
-    right = is_right(*best(), agreeing(), confirms_last(*best()));
-  }
+  std::vector<Trial> trials;
+  for (const Begin& begin : begins(prior, T_body_cam)) trials.push_back(anneal(prior, begin, T_body_cam));
+  const auto best = std::ranges::max_element(trials, {}, &Trial::support);
+  const bool right = best != trials.end() &&
+                     is_right(*best, agreement(trials, *best), is_alone(trials, *best), confirms_last(*best));
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);
   intervals_.clear();
   if (!right) return {};
-  return without_velocity(prior, *best());
+  return without_velocity(prior, *best);
 }
 
 }  // namespace evpose

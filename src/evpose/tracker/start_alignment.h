@@ -25,14 +25,15 @@ struct SeenPrior {
 
 /// Aligns the first view of a camera whose calibration is uncertain. Contours then lie up to several pixels
 /// from where they are expected, further than the tracker's gate reaches, and not all by the same motion: an
-/// error of the focal length moves the rim alone. So the events of the first moments are looked at again and
-/// again, at their own times and under gates that close from several pixels to the tracker's (graduated
-/// non-convexity), for the pose, the velocity and the camera's numbers together. This begins at several poses
-/// (search_pose()), once with the numbers free and once with the pose alone at first; what gathers most
-/// events at the contours is taken, if most starting points lead there, or the events are many and some do.
-/// Else it begins at draws from the prior, too, and the events that follow may confirm the view. Errors that
-/// the events of one edge share are eliminated with a variance of their own for each edge (Student-t), so
-/// that the covariance is one that single disturbed edges do not mislead.
+/// error of the focal length moves the rim alone. So it is first looked up how many events lie at each
+/// distance across each contour (ContourProfiles), and which errors of the prior would put the contours at
+/// most events. From several of these the events of the first moments are looked at again and again, at their
+/// own times and under gates that close from two pixels to the tracker's (graduated non-convexity), for the
+/// pose, the velocity and the camera's numbers together. What gathers most events at the contours is taken,
+/// if most starting points lead there, or the events are many and some do, or no other view has nearly as
+/// many, or the events that follow confirm it. Errors that the events of one edge share, the map's among
+/// them, are eliminated with a variance of their own for each edge (Student-t), so that the covariance is one
+/// that single disturbed edges do not mislead.
 class StartAlignment {
  public:
   /// Worth its time where contours are expected to lie further off than this, px (root mean square).
@@ -64,6 +65,7 @@ class StartAlignment {
   };
   /// One begin of the iteration, and where it led.
   struct Trial {
+    Trial(const SeenPrior& prior, const Begin& begin);
     NavState nav;
     AdjustedCamera::Correction numbers;
     Eigen::MatrixXd H;      ///< information about (pose, velocity, numbers) at the end
@@ -75,22 +77,23 @@ class StartAlignment {
   /// Sums of one edge over samples and intervals.
   struct EdgeSum {
     Eigen::VectorXd row;
-    double weight = 0, offset = 0;
+    double weight = 0, offset = 0, map_variance = 0;  ///< the last one times weight
   };
-  std::vector<Pose> first_guesses(const SeenPrior& prior, const Pose& T_body_cam) const;
-  std::vector<Trial> try_guesses(const SeenPrior& prior, std::span<const Pose> guesses,
-                                 const Pose& T_body_cam);
-  void try_drawn(const SeenPrior& prior, std::span<const Pose> guesses, const Pose& T_body_cam,
-                 std::vector<Trial>& trials);
-  Trial anneal(const SeenPrior& prior, const Begin& begin, const Pose& T_body_cam, double numbers_below_px);
+  std::vector<Begin> begins(const SeenPrior& prior, const Pose& T_body_cam);
+  Eigen::MatrixXd displacement_rows(const SeenPrior& prior, const Pose& T_body_cam,
+                                    std::span<const std::uint32_t> slots, std::size_t count) const;
+  Trial anneal(const SeenPrior& prior, const Begin& begin, const Pose& T_body_cam);
+  std::vector<std::uint32_t> visible_from(const Pose& T_map_cam, const VisibleSetConfig& config) const;
   bool confirms_last(const Trial& view);
-  static bool is_right(const Trial& view, double agreeing, bool confirmed);
+  static bool is_right(const Trial& view, double agreeing, bool alone, bool confirmed);
   void look(const SeenPrior& prior, const Pose& T_body_cam, std::span<const std::uint32_t> points,
             EventRegistration& registration, Trial& trial);
   void add_offsets(const EventRegistration& registration, const Pose& T_cam_map,
                    const Eigen::Matrix<double, 6, 9>& by_state, std::map<std::uint32_t, EdgeSum>& edges,
                    Trial& trial) const;
   void add_edges(const std::map<std::uint32_t, EdgeSum>& edges, Trial& trial) const;
+  static bool is_same(const Trial& a, const Trial& view);
+  static bool is_alone(std::span<const Trial> trials, const Trial& view);
   static double agreement(std::span<const Trial> trials, const Trial& view);
   SeenMeasurement without_velocity(const SeenPrior& prior, const Trial& trial) const;
 

@@ -23,7 +23,8 @@ constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band 
 // texture beside the contours. So much is the right one's, if several starting points or the next events lead
 // to it as well:
 constexpr double kHighConcentration = 0.42, kFewAgree = 0.4, kAlone = 1.5;
-// With less, most starting points have to lead to one view, and its contours have to have events.
+// With less, most starting points have to lead to one view, and its contours have to have events, or the next
+// events have to lead to it as well.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2, kConfirmedWithin = 4;  // sigma
 constexpr double kEdge_m = 0.6;                        // an edge whose events share errors
@@ -320,8 +321,8 @@ bool StartAlignment::confirms_last(const Trial& view) {
 /// `agreeing`: share of the starting points that lead there; `alone`: no other view gathers nearly as many.
 bool StartAlignment::is_right(const Trial& view, double agreeing, bool alone, bool confirmed) {
   if (view.concentration >= kHighConcentration && (confirmed || alone || agreeing >= kFewAgree)) return true;
-  return view.concentration >= kLeastConcentration && view.support >= kLeastSupport &&
-         agreeing >= kLeastAgreement;
+  return view.concentration >= kLeastConcentration && agreeing >= kLeastAgreement &&
+         (confirmed || view.support >= kLeastSupport);
 }
 
 std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, const Pose& T_body_cam) {

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "evpose/map/contour_segments.h"
+#include "evpose/map_learn/median.h"
 
 namespace evpose::map_learn {
 namespace {
@@ -87,12 +88,6 @@ std::vector<std::vector<std::uint32_t>> pieces_of(const ContourMap& map) {
     if (!is_view_dependent(map.points[i].kind)) out[segments.of_point[i]].push_back(i);
   std::erase_if(out, [](const auto& piece) { return piece.empty(); });
   return out;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 class DateComparison {

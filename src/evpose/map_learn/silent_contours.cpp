@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/map_learn/silent_contours.h"
 
-#include <algorithm>
 #include <cmath>
 
+#include "evpose/map_learn/median.h"
 #include "evpose/tracker/contour_selection.h"
 
 namespace evpose::map_learn {
@@ -15,17 +15,6 @@ constexpr double kSpan_s = 0.01;         // over which their motion is taken
 constexpr double kLeastExpected = 20;  // events, below which a segment's silence may be chance
 constexpr double kSilentShare = 0.3;   // of the expected events: what else lies in the gate
 constexpr double kTellsShare = 0.02;   // events a pixel from which on a segment counts as one that tells
-
-bool inside(const Eigen::Vector2d& pixel, ImageSize size) {
-  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < size.width && pixel.y() < size.height;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -43,7 +32,7 @@ std::vector<double> swept_pixels(const TrackJob& job, const Trajectory& trajecto
     if (s.t < next) continue;
     contours.project(s, kSpan_s);
     for (const ContourSample& sample : contours.samples())
-      if (inside(sample.pixel, camera.size()))
+      if (camera.size().contains(sample.pixel))
         out[sample.segment] += std::abs(sample.speed_px_s) * to_seconds(kLook);
     next += kLook;
   }

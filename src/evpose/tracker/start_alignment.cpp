@@ -21,7 +21,7 @@ constexpr double kScatterOfGate = 0.7;     // sigma of the events under a gate, 
 constexpr double kContrastReach_px = 0.1;  // below every gate, so that no band is wider than its gate
 // Chance gives no concentration at all, a wrong view some. How much the right one gives depends on the
 // texture beside the contours. So much is the right one's, if several starting points or the next events lead
-// to it as well:
+// to it as well, or every other view has fewer events by a factor:
 constexpr double kHighConcentration = 0.42, kFewAgree = 0.4, kAlone = 1.5;
 // With less, most starting points have to lead to one view, and its contours have to have events, or the next
 // events have to lead to it as well.

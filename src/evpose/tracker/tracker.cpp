@@ -20,6 +20,12 @@ constexpr TimeNs kLookAside = 13 * kNsPerMs;
 const char* const kTimeIsPast = "the time offset has changed";  // by more than an update
 const char* const kAligning = "aligning the first view";
 
+/// Before the first view is aligned again, after as many failures: each takes a fifth of a second of a core.
+TimeNs pause_after(int failures) {
+  constexpr int kInARow = 8;
+  return failures < kInARow ? 0 : 160 * kNsPerMs;
+}
+
 /// Of segments that have offsets; 0: none have.
 double offset_segment_m(const TrackerConfig& config) {
   return config.fusion.segment_offsets == SegmentOffsetUse::on ? config.fusion.segments.length_m : 0;
@@ -245,18 +251,20 @@ bool Tracker::align_start(TimeNs t, const ImuIncrement& moved) {
   if (!start_alignment_ || supervisor_.searching()) return false;
   const FusionState& state = fusion_->state();
   const SeenPrior prior{state.nav, fusion_->calibration().intrinsics, fusion_->seen_covariance()};
-  constexpr int kMostAlignments = 8;  // then the tracker's own gate has to do
   const bool needed = start_alignment_->expected_offset_px(prior, contours_.samples(), T_body_cam_) >
                       StartAlignment::kNeededAbove_px;
-  if (!needed || alignments_ == kMostAlignments) {
+  if (!needed) {
     start_alignment_.reset();
     return false;
   }
+  if (t < align_again_) return true;
   start_alignment_->add_events(preprocessor_.kept(), preprocessor_.stamp(t), moved, state.angular_rate);
   if (!start_alignment_->has_enough()) return true;
-  ++alignments_;
   const auto measurement = start_alignment_->align(prior, T_body_cam_);
-  if (!measurement) return true;
+  if (!measurement) {
+    align_again_ = t + pause_after(++failed_alignments_);
+    return true;
+  }
   fusion_->update(*measurement);
   take_calibration();
   start_alignment_.reset();

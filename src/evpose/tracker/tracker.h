@@ -143,7 +143,8 @@ class Tracker {
   std::unique_ptr<BackEnd> fusion_;
   PoseSupervisor supervisor_;
   std::optional<StartAlignment> start_alignment_;  ///< until it is done
-  int alignments_ = 0;                             ///< tried
+  int failed_alignments_ = 0;
+  TimeNs align_again_ = 0;  ///< not before
   ImuRateOutput imu_rate_output_;
   UpdateReporter reporter_;
 

@@ -8,8 +8,11 @@
 namespace evpose {
 namespace {
 
-constexpr double kDoubt_px2 = 20;  // of a step of none, or of the map's sign, before anything is seen
-constexpr double kSeedSteps = 1;   // of the threshold, that a map's sign stands for
+constexpr double kDoubt_px2 = 20;     // of a step of none, or of the map's sign, before anything is seen
+constexpr float kGateMemory = 100;    // events in the gates until those before count half
+constexpr double kGateDoubt = 2.5;    // so many of the contour, and as much clutter, before any have come
+constexpr double kLeastShare = 0.02;  // of the contour, and of clutter
+constexpr double kSeedSteps = 1;      // of the threshold, that a map's sign stands for
 
 }  // namespace
 
@@ -39,6 +42,18 @@ void ContrastMemory::sweep(std::uint32_t segment, double area_px2) {
 
 void ContrastMemory::count(std::uint32_t segment, int net) {
   segments_[segment].net += static_cast<float>(net);
+}
+
+void ContrastMemory::count_in_gate(std::uint32_t segment, int net, int all) {
+  Segment& s = segments_[segment];
+  s.gate_net += static_cast<float>(net), s.gate_all += static_cast<float>(all);
+  if (s.gate_all > kGateMemory) s.gate_net *= 0.5F, s.gate_all *= 0.5F;
+}
+
+double ContrastMemory::contour_share(std::uint32_t segment) const {
+  const Segment& s = segments_[segment];
+  const double own = std::abs(s.gate_net), right = 0.5 * (s.gate_all + own);
+  return std::clamp((own + kGateDoubt) / (right + 2 * kGateDoubt), kLeastShare, 1 - kLeastShare);
 }
 
 int ContrastMemory::map_contrast(std::uint32_t segment) const {

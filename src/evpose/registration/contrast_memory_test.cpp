@@ -60,6 +60,21 @@ TEST(ContrastMemory, TextureOfBothSignsCancels) {
   EXPECT_LT(std::abs(memory.steps(0)), 0.02);
 }
 
+/// Of 100 events in the gates `own` are the step's, the others of texture, as many of either polarity.
+TEST(ContrastMemory, WhatTextureAddsIsToldByTheWrongPolarity) {
+  for (const int sign : {-1, 1})
+    for (const int own : {0, 20, 50, 90}) {
+      ContrastMemory memory(2, kThreshold);
+      EXPECT_DOUBLE_EQ(memory.contour_share(0), 0.5);
+      for (int k = 0; k < 50; ++k) memory.count_in_gate(0, sign * own, 100);
+      const double right = own + 0.5 * (100 - own);
+      EXPECT_NEAR(memory.contour_share(0), own / right, 0.05) << own;
+      EXPECT_DOUBLE_EQ(memory.contour_share(1), 0.5);
+      for (int k = 0; k < 50; ++k) memory.count_in_gate(0, -sign * 50, 100);
+      EXPECT_NEAR(memory.contour_share(0), 50.0 / 75, 0.05) << own;
+    }
+}
+
 TEST(ContrastMemory, TheEdgeDelayIsThatOfTheStepWhoseEventsWereCounted) {
   for (const double step : {-3.0, 0.8, 2.0}) {
     ContrastMemory memory(1, kThreshold);

@@ -9,7 +9,7 @@
 namespace evpose {
 namespace {
 
-constexpr double kContourPrior = 0.5;  // an event in the gate is of the contour rather than clutter
+constexpr double kContourPrior = 0.5;  // an event in the gate is of the contour; without polarities
 // Samples stand at least 4 px apart along a contour: each answers for half of that to either side, and more
 // where samples are left out.
 constexpr double kHalfLength_px = 4;
@@ -86,6 +86,11 @@ bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) cons
          std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
+/// Of the events in the gate whose polarity is not excluded.
+double EventRegistration::contour_share(const ContourSample& s) const {
+  return config_.polarity ? contrast_.contour_share(s.segment) : kContourPrior;
+}
+
 EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
   if (!config_.edge_delay) return {0, 0};
   const double fade = std::min(1.0, std::abs(s.speed_px_s) / kFullDelay_px_s);
@@ -103,7 +108,8 @@ EventRegistration::Line EventRegistration::line_of(const ContourSample& s, doubl
   const double gate = gate_of(s);
   const double variance =
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
-  const double odds = kContourPrior / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - kContourPrior);
+  const double share = contour_share(s);
+  const double odds = share / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - share);
   const int forward = s.speed_px_s > 0 ? 1 : -1;
   const EdgeDelay delay = edge_delay(s);
   return {static_cast<float>(forward * delay.on_px),
@@ -194,6 +200,8 @@ void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationRes
     if (std::abs(d) <= contrast_band_px) sum.net += e.on ? line.forward : -line.forward;
     set_verdict(EventVerdict::beside);
     if (std::abs(d) > line.gate) continue;
+    sum.gate_net += e.on ? line.forward : -line.forward;
+    ++sum.gate_all;
     if (config_.polarity && (e.on ? line.wrong_on : line.wrong_off)) {
       set_verdict(EventVerdict::wrong_polarity);
       ++result->wrong_polarity;
@@ -246,6 +254,8 @@ void EventRegistration::learn_contrast(const RegistrationProblem& p) {
     // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
     if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
       contrast_.sweep(s.segment, 2 * kHalfLength_px * std::abs(s.speed_px_s) * swept_s);
+    if (sums_[i].gate_all > 0)
+      contrast_.count_in_gate(s.segment, s.normal_side * sums_[i].gate_net, sums_[i].gate_all);
     if (sums_[i].net != 0) contrast_.count(s.segment, s.normal_side * sums_[i].net);
   }
 }
@@ -282,6 +292,8 @@ void EventRegistration::sum_clusters(const RegistrationProblem& p) {
     Cluster& c = clusters_[number];
     if (c.weight == 0 && config_.ego_motion_test) c.trust = flow_.trust(number);
     c.weight += sums_[i].weight;
+    const double share = contour_share(p.samples[i]), clutter = (1 - share) / share;
+    if (config_.polarity) c.clutter += sums_[i].weight * clutter * clutter;
     c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
   }
 }
@@ -302,8 +314,10 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
     square += sum.square;
     const Cluster& c = clusters_[cluster_numbers_[i]];
     const double own = event_variance / c.weight;
-    const double shared =
-        repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px + c.map_variance / c.weight);
+    // Texture beside a contour moves along with it and draws the mean of its events.
+    const double by_clutter = 1 + c.clutter / c.weight;
+    const double shared = repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px * by_clutter +
+                                     c.map_variance / c.weight);
     const double borne_out =
         config_.judge_contours ? trust_.trust(p.samples[i].segment, concentration_.value()) : 1;
     const double scale = borne_out * c.trust * own / (own + shared) / event_variance;

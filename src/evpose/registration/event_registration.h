@@ -81,8 +81,9 @@ class EventRegistration final : public Registration {
   struct Sum {
     double weight = 0, offset = 0, square = 0;
     GateSums gate;
-    int events = 0, net = 0;    ///< net: events near by, for the contrast
-    int agree = 0, differ = 0;  ///< events in the gate that move as predicted, or not
+    int events = 0, net = 0;         ///< net: events near by, for the contrast
+    int gate_net = 0, gate_all = 0;  ///< likewise in the gate, of both polarities; all
+    int agree = 0, differ = 0;       ///< events in the gate that move as predicted, or not
   };
   /// Derivative of the mean distance by an offset, from sums over events with exponential forgetting: 1 for
   /// events that all lie near the contours, 0 for events spread evenly over the gates.
@@ -92,9 +93,10 @@ class EventRegistration final : public Registration {
     void decay(double span_s);
   };
   struct Cluster {
-    double weight = 0, map_variance = 0, trust = 1;
+    double weight = 0, map_variance = 0, clutter = 0, trust = 1;
   };
   double gate_of(const ContourSample& sample) const;
+  double contour_share(const ContourSample& sample) const;
   void build_bands(std::span<const ContourSample> samples, double span_s);
   void make_lines(const RegistrationProblem& problem);
   Line line_of(const ContourSample& sample, double pose_variance) const;

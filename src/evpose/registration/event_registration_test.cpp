@@ -187,6 +187,32 @@ TEST_F(EventRegistrationLaws, UniformClutterPullsNowhere) {
   EXPECT_NEAR(solved(measure(), 0) * kFocal, 0, 0.05);
 }
 
+TEST_F(EventRegistrationLaws, AnEdgeAmongTextureCountsForLess) {
+  for (const int texture : {0, 1, 3}) {  // events of each polarity for every one of the edge
+    samples_.clear(), events_.clear();
+    add_line({100, 20}, {1, 0}, 500, 40);
+    add_line({220, 20}, {1, 0}, 500, 40);
+    for (std::size_t i = 40; i < samples_.size(); ++i) samples_[i].segment = 1;
+    draw_events(0);
+    for (auto& e : events_) e.on = 1;
+    const std::vector<FilteredEvent> edges = events_;
+    for (const FilteredEvent& e : edges)
+      for (int k = 0; e.x > 160 && k < 2 * texture; ++k) {
+        events_.push_back(e);
+        events_.back().on = k % 2 == 0 ? 1 : 0;
+      }
+    EventRegistration registration({320, 240}, config_, 2);
+    for (int k = 0; k < 5; ++k) registration.measure({events_, kNow, kSpan_s, samples_, covariance_});
+    double weight[2] = {0, 0};
+    for (const SampleOffset& o : registration.offsets()) weight[samples_[o.sample].segment] += o.weight;
+    if (texture == 0) {
+      EXPECT_NEAR(weight[1], weight[0], 0.01 * weight[0]);
+    }
+    // Not told apart, three or seven events in place of one would count for more.
+    EXPECT_LT(weight[1], (texture == 3 ? 0.3 : 1.02) * weight[0]);
+  }
+}
+
 TEST_F(EventRegistrationLaws, InformationOfOneClusterIsBounded) {
   add_line({150, 33}, {1, 0}, 0, 4);
   std::vector<double> information;

@@ -72,8 +72,9 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
       registration_(make_registration(config, setup_.camera->size(), *setup_.map, map_.segments)),
+      frames_(make_frame_input(config, setup_, map_.segments)),
       fusion_(std::move(fusion)),
-      supervisor_(config.relocalization, config.health,
+      supervisor_(relocalization_config(config), config.health,
                   Relocalizer({map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                                config.visible, config.event_registration}),
                   PoseVerifier(setup_.camera->size(), map_.segments.count,
@@ -89,7 +90,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());
   supervisor_.start(fusion_->state(), uncertainty.sigma_px());
   const CalibrationConfig& uncertain = config.fusion.calibration;
-  if (uncertain.intrinsics || uncertain.rotation || uncertain.translation)
+  const bool by_events = config.frames.use != FrameUse::alone;
+  if (by_events && (uncertain.intrinsics || uncertain.rotation || uncertain.translation))
     start_alignment_.emplace(
         RelocalizerScene{map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                          config.visible, config.event_registration},
@@ -102,6 +104,11 @@ void Tracker::add_imu(const ImuSample& sample) {
   imu_rate_output_.add(imu_.add(sample, fusion_->state().t));
   imu_rate_output_.report_until(imu_time(next_update_), *fusion_, imu_);
   make_due_updates();
+}
+
+void Tracker::add_frame(Frame frame) {
+  EVPOSE_CHECK(frame.size == setup_.camera->size());
+  if (frames_) frames_->add(std::move(frame));
 }
 
 void Tracker::add_events(const EventPacket& packet) {
@@ -180,6 +187,7 @@ void Tracker::page_map() {
   map_ = std::move(next->prepared);
   contours_.renumber(next->point_now);
   registration_->rearrange_segments(next->segment_before, next->contrast);
+  if (frames_) frames_->rearrange_segments(next->segment_before, next->contrast);
   supervisor_.rearrange(next->segment_before);
 }
 
@@ -197,6 +205,7 @@ void Tracker::see_contours(double span_s) {
 /// Where the map has them, or where their segments are known to stand.
 void Tracker::project_samples(const FusionState& state, double span_s) {
   contours_.project(state, span_s);
+  projected_ = state.nav;
   if (!map_.offset_segments.empty())
     contours_.displace(
         [this](std::uint32_t point) { return fusion_->displacement_of(map_.offset_segments[point]); });
@@ -211,14 +220,17 @@ Update Tracker::update(TimeNs t) {
   see_contours(span_s);
   reporter_.end_stage(&StageTimes::predict_s);
   const bool aligning = align_start(t, moved);
-  const RegistrationResult stpe =
+  RegistrationResult stpe =
       supervisor_.searching() || aligning ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
   reporter_.end_stage(&StageTimes::register_s);
   const double innovation =
       evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
   std::string refused = aligning ? kAligning : supervisor_.refusal(t, stpe, innovation);
   if (imu_time(t) < from) refused = kTimeIsPast;
-  if (refused.empty()) fuse(stpe);  // eq. (3), (5), (6)
+  if (refused.empty())
+    fuse(stpe, registration_->offsets(), frames_ ? frames_->share_of_events() : 1);  // eq. (3), (5), (6)
+  if (!aligning && !supervisor_.searching() && fuse_frame(t, stpe)) refused.clear();
+  if (frames_) frames_->remember(t, fusion_->state());
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty());
   judge(t, span_s, stpe, refused);
@@ -235,6 +247,7 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   if (!found) return;
   fusion_->start(*found);
   registration_->restart();
+  if (frames_) frames_->restart();
   imu_.restart_comparison();
   contours_.choose(found->nav.T_map_body);
 }
@@ -295,7 +308,8 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
 /// +1: it is darker where the map's normal points, -1: brighter, 0: not known.
 int Tracker::darker_side(std::uint32_t segment) const {
   const ContrastMemory* contrast = registration_->contrast();
-  return contrast == nullptr ? 0 : -contrast->map_contrast(segment);
+  const int by_events = contrast == nullptr ? 0 : contrast->map_contrast(segment);
+  return -(by_events == 0 && frames_ ? frames_->contrast(segment) : by_events);
 }
 
 ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concentration) const {
@@ -317,12 +331,32 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concent
   return out;
 }
 
-void Tracker::fuse(const RegistrationResult& measurement) {
+/// With a frame that has been exposed since the last update, if there is one and it is believed. Where no
+/// events were used, `measured` becomes what it says.
+bool Tracker::fuse_frame(TimeNs t, RegistrationResult& measured) {
+  if (!frames_) return false;
+  FrameInput::Seen seen{contours_.samples(), fusion_->measured_covariance(), {}, fusion_->state()};
+  const NavState& now = fusion_->state().nav;
+  seen.forecast = {now.T_map_body.minus(projected_.T_map_body), now.velocity - projected_.velocity};
+  const auto found = frames_->measure(t, seen);
+  if (!found) return false;
+  const double innovation = evpose::innovation(seen.pose_covariance, {found->information, found->vector});
+  if (!frames_->refusal(*found, innovation, config_.health.innovation_gate).empty()) return false;
+  fuse(*found, frames_->offsets());
+  if (measured.inliers == 0) measured = *found;
+  return true;
+}
+
+/// With a share of its information.
+void Tracker::fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets,
+                   double share) {
   offsets_.clear();
   if (fusion_->takes_contours())
-    for (const SampleOffset& offset : registration_->offsets())
+    for (SampleOffset offset : offsets) {
+      offset.weight *= share;
       offsets_.push_back(contour_offset(offset, measurement.gate_concentration));
-  fusion_->update({measurement.information, measurement.vector}, offsets_);
+    }
+  fusion_->update({share * measurement.information, share * measurement.vector}, offsets_);
   take_calibration();
 }
 
@@ -330,9 +364,10 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
                     const std::string& refused) {
   Matrix6d covariance = fusion_->reported_state().pose_covariance();
   std::string reason;
-  const Health health = supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement),
-                                           contours_.typical_depth_m(), setup_.camera->focal_px()},
-                                          *fusion_, &reason);
+  const Health health =
+      supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement), contours_.typical_depth_m(),
+                         setup_.camera->focal_px(), frames_confirm(t)},
+                        *fusion_, &reason);
   covariance += supervisor_.doubt();
   reporter_.add_judgement(health, std::move(reason), covariance);
 }
@@ -342,7 +377,7 @@ std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) cons
   if (std::string imu = imu_.fault(t); !imu.empty()) return imu;
   if (reporter_.most_events_shed(preprocessor_.counts()))
     return "more events than are taken (events.most_mev_s)";
-  if (!measurement.consistent) return "events do not gather at the contours";
+  if (!measurement.consistent && !frames_confirm(t)) return "events do not gather at the contours";
   return imu_.contradicts(t) ? "IMU contradicts the camera" : "";
 }
 

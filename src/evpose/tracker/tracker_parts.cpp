@@ -48,6 +48,18 @@ std::unique_ptr<Registration> make_registration(const TrackerConfig& config, Ima
                                                             config.threads));
 }
 
+std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const TrackerSetup& setup,
+                                           const ContourSegments& segments) {
+  if (config.frames.use == FrameUse::off) return {};
+  return FrameInput(setup.camera->size(), setup.frame_camera, contrast_of_segments(*setup.map, segments));
+}
+
+RelocalizationConfig relocalization_config(const TrackerConfig& config) {
+  RelocalizationConfig out = config.relocalization;
+  out.on = out.on && config.frames.use != FrameUse::alone;
+  return out;
+}
+
 Status check_start(const ContourMap& map, const StartState& start, double far_m) {
   const Eigen::Vector3d& p = start.T_map_body.p;
   if (!p.allFinite() || !start.T_map_body.q.coeffs().allFinite() || !start.velocity.allFinite())

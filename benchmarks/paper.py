@@ -70,5 +70,5 @@ def make(bench):
 
 
 def make_evaluation(bench):
-    """docs/results/paper-evaluation.md: distributions, relative errors, rates, classes of flights, a real chunk."""
+    """docs/results/paper-evaluation.md: distributions, relative errors, rates, a real chunk."""
     return bench.write_page("paper-evaluation", paper_evaluation.sections(bench))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/paper-evaluation.md: the evaluation of EV-Pose with its form and with the defaults: distributions of the error,
-relative errors, rates of updates, classes of flights, a real chunk."""
+relative errors, rates of updates, a real chunk."""
 import json
 import pathlib
 import subprocess
@@ -16,13 +16,6 @@ FORMS = {"paper": ("--preset", "paper"), "defaults": ()}
 PLACES = {"indoors": ["room_spiral", "room_720p", "room_people", "room_hover"], "outdoors": ["courtyard_landing"]}
 QUANTILES = (10, 25, 50, 75, 90, 95, 100)
 RATES_HZ = (100, 200, 300)
-SECONDS = 1.5
-# Simulated at 320x240: class, scenario, settings.
-FLIGHTS = [("speed", "speed_1", ()), ("speed", "speed_2", ()), ("speed", "speed_3", ()),
-           ("turning", "turning_1", ()), ("turning", "turning_2", ()), ("turning", "turning_3", ()),
-           ("HDR", "hdr_window", ()), ("HDR", "hdr_lights_off", ("lamps.off_at_s=0.6", "lamps.on_at_s=1.1")),
-           ("HDR", "hdr_flicker", ()),
-           ("dynamic", "people", ()), ("dynamic", "fan", ()), ("dynamic", "car", ())]
 COLOURS = {"paper": "#d1622b", "defaults": "#1f77d0"}
 # What `--preset paper` sets, for programs that take settings alone.
 PAPER_SETTINGS = ("registration.kind=temporal_field", "temporal_field.kernel=bilinear", "temporal_field.eta_s=0.01",
@@ -130,14 +123,6 @@ def rates(bench, peers):
     return tables.table(["form", *(r.name for r in peers)], rows)
 
 
-def classes(bench):
-    rows = []
-    for kind, scenario, settings in FLIGHTS[:1] if bench.quick else FLIGHTS:
-        flight = bench.simulated(scenario, SECONDS, (*harness.TINY, *settings), f"paper_{scenario}")
-        rows.append([kind, scenario, *(errors(measure(bench, flight, form)) for form in FORMS)])
-    return tables.table(["class", "flight", *FORMS], rows)
-
-
 def real_chunk(bench):
     rows = []
     for form, settings in (("paper", PAPER_SETTINGS), ("defaults", ())):
@@ -159,4 +144,4 @@ def real_chunk(bench):
 def sections(bench):
     peers = bench.peers()
     return {"distributions": distributions(bench, peers), "relative": relative(bench, peers), "rates": rates(bench, peers),
-            "classes": classes(bench), "real chunk": real_chunk(bench)}
+            "real chunk": real_chunk(bench)}

@@ -27,9 +27,11 @@ constexpr double kSharedSigma_px = 0.06;  // that edges of a cell and direction 
 // Light and shade beside an edge move it the more the weaker it is: a slope of the luminance, as a share of
 // it, over the edge's own step.
 constexpr double kShade_px = 0.1;
-constexpr double kOfBlur = 0.12;    // of both, by the width of the blur
-constexpr double kShared_s = 0.5;   // how long a shared error lasts
-constexpr double kEdgePrior = 0.7;  // an edge in the gate is the contour's rather than texture
+constexpr double kOfBlur = 0.12;        // of both, by the width of the blur
+constexpr double kShared_s = 1;         // how long a shared error lasts
+constexpr double kEdgePrior = 0.7;      // an edge in the gate is the contour's rather than texture
+constexpr double kFollowsGain = 0.2;    // of one frame
+constexpr double kLeastFollows = 0.15;  // keeps corrections finite
 constexpr int kCellsPerWidth = 20;
 
 // Signs of contrast.
@@ -74,6 +76,27 @@ double FrameRegistration::expected_offset_px(const FrameProblem& p, const Contou
          age_s * s.jacobian.head<3>().dot(p.forecast.velocity);
 }
 
+/// Luminance along the normal around `offset_px` from the sample, `half` steps to each side, averaged along
+/// the contour and summed up; false where that leaves the image.
+bool FrameRegistration::sum_profile(const ContourSample& s, double offset_px, int half) {
+  const Eigen::Vector2d centre = s.pixel + offset_px * s.normal_px;
+  const Eigen::Vector2d along(-s.normal_px.y(), s.normal_px.x());
+  for (const double side : {-1.0, 1.0})
+    for (const int end : {-half, half})
+      if (!image_.contains(centre + end * kStep_px * s.normal_px + side * 0.5 * (kLines - 1) * along))
+        return false;
+
+  profile_.assign(static_cast<std::size_t>(2 * half + 1) + 1, 0);  // summed up, with a 0 in front
+  for (int k = -half; k <= half; ++k) {
+    double sum = 0;
+    for (int line = 0; line < kLines; ++line)
+      sum += image_.at(centre + k * kStep_px * s.normal_px + (line - 0.5 * (kLines - 1)) * along);
+    const auto i = static_cast<std::size_t>(k + half);
+    profile_[i + 1] = profile_[i] + sum / kLines;
+  }
+  return true;
+}
+
 /// The one clear edge within the gate, of the sign that the contour is known to have.
 std::optional<FrameRegistration::Edge> FrameRegistration::find_edge(const FrameProblem& p,
                                                                     std::size_t sample) {
@@ -86,21 +109,7 @@ std::optional<FrameRegistration::Edge> FrameRegistration::find_edge(const FrameP
   const int window = static_cast<int>(std::lround((kSoft_px + 0.5 * blur_px) / kStep_px));
   const int reach = static_cast<int>(std::ceil(gate_px / kStep_px)) + 1;
   const int half = reach + window;
-  const Eigen::Vector2d centre = s.pixel + expected_offset_px(p, s) * s.normal_px;
-  const Eigen::Vector2d along(-s.normal_px.y(), s.normal_px.x());
-  for (const double side : {-1.0, 1.0})
-    for (const int end : {-half, half})
-      if (!image_.contains(centre + end * kStep_px * s.normal_px + side * 0.5 * (kLines - 1) * along))
-        return {};
-
-  profile_.assign(static_cast<std::size_t>(2 * half + 1) + 1, 0);  // summed up, with a 0 in front
-  for (int k = -half; k <= half; ++k) {
-    double sum = 0;
-    for (int line = 0; line < kLines; ++line)
-      sum += image_.at(centre + k * kStep_px * s.normal_px + (line - 0.5 * (kLines - 1)) * along);
-    const auto i = static_cast<std::size_t>(k + half);
-    profile_[i + 1] = profile_[i] + sum / kLines;
-  }
+  if (!sum_profile(s, expected_offset_px(p, s), half)) return {};
   const auto mean = [&](int from, int to) {  // of the places from..to, both included
     return (profile_[static_cast<std::size_t>(to + half) + 1] -
             profile_[static_cast<std::size_t>(from + half)]) /
@@ -151,6 +160,7 @@ void FrameRegistration::weigh(const FrameProblem& p, Edge& edge) const {
   const double odds = kEdgePrior / (1 - kEdgePrior) * 2 * edge.gate_px / std::sqrt(2 * M_PI * variance) *
                       std::exp(-0.5 * square(edge.offset_px) / variance);
   edge.weight = odds / (1 + odds);
+  edge.slope = edge.weight - edge.weight * (1 - edge.weight) * square(edge.offset_px) / variance;
 }
 
 void FrameRegistration::learn_contrast(const FrameProblem& p) {
@@ -188,7 +198,11 @@ void FrameRegistration::sum_clusters(const FrameProblem& p) {
 /// Normal equations over the edges; the information of a cluster is capped by the error that it shares.
 void FrameRegistration::sum_information(const FrameProblem& p, RegistrationResult& result) {
   const double repeats = FrameRegistration::repeats(p.since_last_s);
-  double weights = 0, squares = 0;
+  double weights = 0, squares = 0, slopes = 0;
+  for (const Edge& edge : edges_) weights += edge.weight, slopes += edge.slope;
+  const double follows = follows_;
+  // For the next frame: at a pose that is off as a whole, one alone would take its edges for texture.
+  if (weights > 0) follows_ += kFollowsGain * (std::clamp(slopes / weights, kLeastFollows, 1.0) - follows_);
   offsets_.clear();
   for (const Edge& edge : edges_) {
     const Cluster& c = clusters_[edge.cell];
@@ -196,10 +210,9 @@ void FrameRegistration::sum_information(const FrameProblem& p, RegistrationResul
     const double shared = repeats * (c.shared_variance + c.map_variance) / c.information;
     const double weight = edge.weight / edge.variance / (1 + shared * c.information);
     const Vector6d& J = p.samples[edge.sample].jacobian;
-    result.information.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
+    result.information.selfadjointView<Eigen::Lower>().rankUpdate(J, follows * weight);
     result.vector -= weight * edge.offset_px * J;
-    offsets_.push_back({edge.sample, -edge.offset_px, weight});
-    weights += edge.weight;
+    offsets_.push_back({edge.sample, -edge.offset_px / follows, follows * weight});
     squares += edge.weight * square(edge.offset_px);
   }
   result.information.triangularView<Eigen::StrictlyUpper>() = result.information.transpose();

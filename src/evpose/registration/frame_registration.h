@@ -65,12 +65,14 @@ class FrameRegistration {
     double weight = 0;       ///< of being the contour's, 0..1
     std::uint32_t cell = 0;
     bool brighter_ahead;  ///< it is brighter towards the normal
+    double slope = 0;     ///< derivative of weight times offset by an offset of the pose
   };
   struct Cluster {
     double information = 0, map_variance = 0, shared_variance = 0;
   };
   double expected_offset_px(const FrameProblem& problem, const ContourSample& sample) const;
   std::optional<Edge> find_edge(const FrameProblem& problem, std::size_t sample);
+  bool sum_profile(const ContourSample& sample, double offset_px, int half);
   void weigh(const FrameProblem& problem, Edge& edge) const;
   void learn_contrast(const FrameProblem& problem);
   void sum_clusters(const FrameProblem& problem);
@@ -86,6 +88,8 @@ class FrameRegistration {
   std::vector<Cluster> clusters_;
   std::vector<SampleOffset> offsets_;
   std::vector<double> profile_, response_;
+  double follows_ = 1;  ///< share by which the weighted mean of the edges follows an offset of the pose:
+                        ///< texture in the gates stays where it is
   bool agrees_ = false;
 };
 

@@ -39,6 +39,7 @@ TEST_F(FrameRegistrationOf, FindsEdgesAtRestToATwentiethOfAPixel) {
   for (const double angle : {0.0, 0.3, 0.8, 1.5})
     for (const double shift : {-0.8, -0.35, 0.0, 0.15, 0.6}) {
       const TestLine line{.angle = angle, .distance_px = angle < 1 ? 90.3 : 60.3};
+      use({.gamma = 2.2});
       const RegistrationResult result = measure(frame_of_line(line, 2.2), samples_of_line(line, shift));
       ASSERT_GT(result.inliers, 10) << angle;
       EXPECT_NEAR(mean_offset(), shift, 0.05) << angle;

@@ -15,7 +15,7 @@ constexpr double kFirstInterval_s = 0.033;
 constexpr TimeNs kFresh = 200 * kNsPerMs;  // a frame that tells where the contours are now
 constexpr double kDoubtMemory_s = 1;       // of a contradiction between frames and the pose
 constexpr double kDoubtRises_s = 0.1;
-constexpr double kUsualDoubt = 0.5;  // beyond it, events lose information by the square
+constexpr double kUsualDoubt = 1;  // beyond it, events lose information by the square
 
 }  // namespace
 
@@ -102,10 +102,12 @@ double FrameInput::share_of_events() const {
   return excess > 1 ? 1 / (excess * excess) : 1;
 }
 
-std::string FrameInput::refusal(const RegistrationResult& result, double innovation, double innovation_gate) {
+std::string FrameInput::refusal(const RegistrationResult& result, const Matrix6d& pose_covariance,
+                                double innovation_gate) {
   if (result.inliers < kLeastInliers)
     return text("only ", result.inliers, " of ", result.points, " map points have an edge in the frame");
-  if (!(innovation <= innovation_gate)) return "the frame contradicts the prediction";
+  if (!(innovation(pose_covariance, {result.information, result.vector}) <= innovation_gate))
+    return "the frame contradicts the prediction";
   return "";
 }
 

@@ -52,7 +52,8 @@ class FrameInput {
   /// Of that measurement.
   std::span<const SampleOffset> offsets() const;
   /// Why it is not used; empty if it is.
-  static std::string refusal(const RegistrationResult& result, double innovation, double innovation_gate);
+  static std::string refusal(const RegistrationResult& result, const Matrix6d& pose_covariance,
+                             double innovation_gate);
   /// The last frames have shown the contours where the pose has them.
   bool confirms(TimeNs t) const;
   /// Share of the events' information that is used: less where the pose that they hold contradicts the frames

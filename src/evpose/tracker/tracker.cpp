@@ -227,10 +227,8 @@ Update Tracker::update(TimeNs t) {
       evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
   std::string refused = aligning ? kAligning : supervisor_.refusal(t, stpe, innovation);
   if (imu_time(t) < from) refused = kTimeIsPast;
-  if (refused.empty())
-    fuse(stpe, registration_->offsets(), frames_ ? frames_->share_of_events() : 1);  // eq. (3), (5), (6)
-  if (!aligning && !supervisor_.searching() && fuse_frame(t, stpe)) refused.clear();
-  if (frames_) frames_->remember(t, fusion_->state());
+  if (refused.empty()) fuse(stpe, registration_->offsets(), frames_ ? frames_->share_of_events() : 1);
+  if (fuse_frame(t, aligning, stpe)) refused.clear();
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty());
   judge(t, span_s, stpe, refused);
@@ -333,18 +331,25 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concent
 
 /// With a frame that has been exposed since the last update, if there is one and it is believed. Where no
 /// events were used, `measured` becomes what it says.
-bool Tracker::fuse_frame(TimeNs t, RegistrationResult& measured) {
+bool Tracker::fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured) {
   if (!frames_) return false;
-  FrameInput::Seen seen{contours_.samples(), fusion_->measured_covariance(), {}, fusion_->state()};
+  const auto found = aligning || supervisor_.searching() ? std::nullopt : frames_->measure(t, frame_view());
+  const bool used =
+      found &&
+      frames_->refusal(*found, fusion_->measured_covariance(), config_.health.innovation_gate).empty();
+  if (used) fuse(*found, frames_->offsets());
+  if (used && measured.inliers == 0) measured = *found;
+  frames_->remember(t, fusion_->state());
+  return used;
+}
+
+/// What a frame is measured with: the contours, and the state since they were projected.
+FrameInput::Seen Tracker::frame_view() const {
   const NavState& now = fusion_->state().nav;
-  seen.forecast = {now.T_map_body.minus(projected_.T_map_body), now.velocity - projected_.velocity};
-  const auto found = frames_->measure(t, seen);
-  if (!found) return false;
-  const double innovation = evpose::innovation(seen.pose_covariance, {found->information, found->vector});
-  if (!frames_->refusal(*found, innovation, config_.health.innovation_gate).empty()) return false;
-  fuse(*found, frames_->offsets());
-  if (measured.inliers == 0) measured = *found;
-  return true;
+  return {contours_.samples(),
+          fusion_->measured_covariance(),
+          {now.T_map_body.minus(projected_.T_map_body), now.velocity - projected_.velocity},
+          fusion_->state()};
 }
 
 /// With a share of its information.
@@ -379,32 +384,6 @@ std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) cons
     return "more events than are taken (events.most_mev_s)";
   if (!measurement.consistent && !frames_confirm(t)) return "events do not gather at the contours";
   return imu_.contradicts(t) ? "IMU contradicts the camera" : "";
-}
-
-ContourMap Tracker::map_with_learnt_contrast() const {
-  ContourMap out = *map_.map;
-  const ContrastMemory* learnt = registration_->contrast();
-  for (std::size_t i = 0; learnt != nullptr && i < out.points.size(); ++i)
-    if (const int sign = learnt->map_contrast(map_.segments.of_point[i]); sign != 0)
-      out.points[i].contrast = static_cast<std::int8_t>(sign);
-  return out;
-}
-
-Snapshot Tracker::snapshot(double decay_s) const {
-  Snapshot out;
-  out.size = setup_.camera->size();
-  const auto pixels = static_cast<std::size_t>(out.size.width) * static_cast<std::size_t>(out.size.height);
-  out.decay = preprocessor_.surface() != nullptr
-                  ? decayed(*preprocessor_.surface(), preprocessor_.stamp(fusion_->state().t), decay_s)
-                  : std::vector<float>(pixels);
-  out.points = chosen_points(decay_s);
-  return out;
-}
-
-std::vector<Snapshot::Point> Tracker::chosen_points(double decay_s) const {
-  const FusionState& state = fusion_->state();
-  return project_points(contours_.view(), contours_.points(), state.nav.T_map_body, preprocessor_.surface(),
-                        preprocessor_.stamp(state.t), decay_s);
 }
 
 }  // namespace evpose

@@ -128,7 +128,8 @@ class Tracker {
   RegistrationResult measure(TimeNs t, double span_s);
   int darker_side(std::uint32_t segment) const;
   ContourOffset contour_offset(const SampleOffset& offset, double concentration) const;
-  bool fuse_frame(TimeNs t, RegistrationResult& measured);
+  bool fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured);
+  FrameInput::Seen frame_view() const;
   void fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets, double share = 1);
   bool frames_confirm(TimeNs t) const { return frames_ && frames_->confirms(t); }
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);

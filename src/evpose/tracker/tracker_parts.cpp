@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "evpose/registration/contrast_memory.h"
+
 namespace evpose {
 namespace {
 
@@ -52,6 +54,15 @@ std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const Tr
                                            const ContourSegments& segments) {
   if (config.frames.use == FrameUse::off) return {};
   return FrameInput(setup.camera->size(), setup.frame_camera, contrast_of_segments(*setup.map, segments));
+}
+
+ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,
+                         const ContrastMemory* learnt) {
+  ContourMap out = map;
+  for (std::size_t i = 0; learnt != nullptr && i < out.points.size(); ++i)
+    if (const int sign = learnt->map_contrast(segments.of_point[i]); sign != 0)
+      out.points[i].contrast = static_cast<std::int8_t>(sign);
+  return out;
 }
 
 RelocalizationConfig relocalization_config(const TrackerConfig& config) {

@@ -22,6 +22,10 @@ std::unique_ptr<Registration> make_registration(const TrackerConfig& config, Ima
 std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const TrackerSetup& setup,
                                            const ContourSegments& segments);
 
+/// The map with the signs that were learnt; null: none were.
+ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,
+                         const ContrastMemory* learnt);
+
 /// Without events no pose can be searched.
 RelocalizationConfig relocalization_config(const TrackerConfig& config);
 

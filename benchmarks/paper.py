@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared recordings."""
 import experiments
+import paper_evaluation
 import tables
 
 OF_MAP = "paper: signs of the map alone"
@@ -66,3 +67,8 @@ def make(bench):
     steps = ["paper", *(name for name in names if name[0].isdigit())]
     return bench.write_page("paper", {"steps": section(measured, steps), "parts": section(measured, PARTS),
                                       "early stage": section(measured, EARLY_STAGE)})
+
+
+def make_evaluation(bench):
+    """docs/results/paper-evaluation.md: distributions, relative errors, rates, a real chunk."""
+    return bench.write_page("paper-evaluation", paper_evaluation.sections(bench))

@@ -26,6 +26,8 @@ BENCHMARKS = {
     "unseen": ("experiments", "make_unseen", "flights that nobody has looked at, with all that may be wrong", "3 h"),
     "ablation": ("experiments", "make_ablation", "the tracker without one of its parts; its picture", "10 min"),
     "paper": ("paper", "make", "from the paper's form to the defaults, one replacement at a time", "15 min"),
+    "paper-evaluation": ("paper", "make_evaluation", "its evaluation: distributions, rates, a real chunk", "5 min"),
+    "frames": ("frames", "make", "frames alone, events alone and both, on simulated flights", "15 min"),
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
     "relocalization": ("experiments", "make_relocalization", "starts from wrong poses and with wrong maps", "20 min"),

@@ -82,6 +82,7 @@ Expected<int> convert(const ConvertRequest& request) {
   if (!kind) return kind.error();
   switch (*kind) {
     case InputKind::recording:
+      if (request.output_format == "euroc") return convert_to_euroc(request);
       return names_folder(request.output) ? convert_to_recording(request)
              : names_bag(request)         ? convert_to_bag(request)
                                           : convert_events_of_recording(request);
@@ -213,7 +214,9 @@ void add_convert(CLI::App& app, std::function<int()>& run) {
       ->check(CLI::IsMember({"camera", "marker"}));
   command->add_option("--topic", r.topic, "of a bag with several event streams");
   command->add_option("--from-format", r.input_format, "of events, where content and ending do not tell");
-  command->add_option("--to-format", r.output_format, "of events, where the ending does not tell");
+  command->add_option("--to-format", r.output_format,
+                      "of events, where the ending does not tell; euroc: a folder with frames and "
+                      "IMU as EuRoC has them, with settings for ORB-SLAM3");
   command->callback([request, &run] {
     run = [request] {
       const InterruptGuard guard;

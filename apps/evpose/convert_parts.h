@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -9,6 +10,8 @@
 
 #include "evpose/io/events/event_reader.h"
 #include "evpose/io/events/event_writer.h"
+#include "evpose/io/files/new_folder.h"
+#include "evpose/io/recording/recording.h"
 
 namespace evpose {
 
@@ -65,14 +68,31 @@ struct Crop {
 };
 Crop crop_of(const ConvertRequest& request, TimeNs first);
 
+/// Rows of anything with a time, in place.
+template <class Timed>
+void shift_and_crop(std::vector<Timed>& rows, const Crop& crop, TimeNs offset) {
+  std::erase_if(rows, [&](const Timed& row) { return !crop.holds(row.t); });
+  for (Timed& row : rows) row.t += offset;
+}
+
+Status read_all(ImuReader reader, std::vector<ImuSample>& out);
+
 /// Writes the events that pass the filter and ends the file; nullopt when interrupted. An Error where none is
 /// left.
 Expected<std::optional<ConvertCounts>> write_events(const ConvertRequest& request, EventReader& reader,
                                                     const EventFilter& filter, EventWriter& writer);
 
+/// The recording's frames, or those between the events of the input where these have the camera's size, into
+/// frames/ of a recording folder; how many.
+Expected<std::size_t> write_frames(const NewFolder& folder, const ConvertRequest& request,
+                                   const std::optional<Recording>& recording, ImageSize size,
+                                   const Crop& crop);
+
 // The kinds of conversion; each gives the exit status or an error.
 Expected<int> convert_events(const ConvertRequest& request);
 Expected<int> convert_to_recording(const ConvertRequest& request);
+/// Frames, IMU and ground truth as EuRoC lays them out, with settings for ORB-SLAM3.
+Expected<int> convert_to_euroc(const ConvertRequest& request);
 Expected<int> convert_to_bag(const ConvertRequest& request);
 Expected<int> convert_trajectory(const ConvertRequest& request);
 Expected<int> convert_imu(const ConvertRequest& request);

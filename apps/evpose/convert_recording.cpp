@@ -30,6 +30,7 @@ struct Source {
   std::optional<ImuNoise> noise;
   std::vector<std::string> copies;  ///< files that are taken as they are
   std::vector<std::string> missing;
+  std::optional<Recording> recording;
 };
 
 /// With crop (on the clock of the input) and offset of the request added.
@@ -44,19 +45,10 @@ EventReadOptions cropped(EventReadOptions options, const Crop& crop, const Conve
   return options;
 }
 
-Status read_all(ImuReader reader, std::vector<ImuSample>& out) {
-  ImuSample sample;
-  while (true) {
-    const auto more = reader.next(sample);
-    if (!more) return more.error();
-    if (!*more) return {};
-    out.push_back(sample);
-  }
-}
-
 Expected<Source> from_recording(const Recording& r, const ConvertRequest& request) {
   Source out;
   out.first = r.first_ns;
+  out.recording = r;
   const Crop crop = crop_of(request, out.first);
   auto events = open_events(r.events_path, r.events_format, cropped(r.event_options, crop, request));
   if (!events) return events.error();
@@ -112,12 +104,6 @@ Expected<Source> open_source(const ConvertRequest& request) {
   if (recording) return from_recording(*recording, request);
   if (!request.calibration.empty() || fs::is_directory(request.input)) return recording.error();
   return from_file(request);
-}
-
-template <class Timed>
-void shift_and_crop(std::vector<Timed>& rows, const Crop& crop, TimeNs offset) {
-  std::erase_if(rows, [&](const Timed& row) { return !crop.holds(row.t); });
-  for (Timed& row : rows) row.t += offset;
 }
 
 Status write_rest(const NewFolder& folder, const std::string& place, const Source& source) {
@@ -176,6 +162,16 @@ class BagOfAll : public EventWriter {
 
 }  // namespace
 
+Status read_all(ImuReader reader, std::vector<ImuSample>& out) {
+  ImuSample sample;
+  while (true) {
+    const auto more = reader.next(sample);
+    if (!more) return more.error();
+    if (!*more) return {};
+    out.push_back(sample);
+  }
+}
+
 Expected<int> convert_to_bag(const ConvertRequest& request) {
   auto source = open_source(request);
   if (!source) return source.error();
@@ -233,9 +229,13 @@ Expected<int> convert_to_recording(const ConvertRequest& request) {
   shift_and_crop(source->imu, crop, offset);
   shift_and_crop(source->groundtruth, crop, offset);
   if (auto status = write_rest(*folder, request.output, *source); !status) return status.error();
+  const auto frames = how.undistort ? Expected<std::size_t>(0)
+                                    : write_frames(*folder, request, source->recording, size, crop);
+  if (!frames) return frames.error();
   if (auto status = folder->commit(); !status) return status.error();
-  std::printf("%s: %lld events, %zu IMU samples, %zu poses\n", request.output.c_str(),
-              static_cast<long long>((*written)->written), source->imu.size(), source->groundtruth.size());
+  std::printf("%s: %lld events, %zu IMU samples, %zu poses, %zu frames\n", request.output.c_str(),
+              static_cast<long long>((*written)->written), source->imu.size(), source->groundtruth.size(),
+              *frames);
   for (const std::string& missing : source->missing) std::printf("missing: %s\n", missing.c_str());
   return 0;
 }

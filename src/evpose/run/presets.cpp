@@ -22,6 +22,7 @@ constexpr std::array kPaper{
     Setting{"events.noise_filter.support_min_s", "0.01"},
     Setting{"events.noise_filter.support_max_s", "0.01"},
     Setting{"fusion.kind", "graph"},
+    Setting{"frames.use", "off"},
 };
 
 }  // namespace

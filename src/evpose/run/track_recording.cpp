@@ -19,7 +19,6 @@
 #include "evpose/io/recording/recording.h"
 #include "evpose/report/overlay.h"
 #include "evpose/run/open_map.h"
-#include "evpose/run/packet_queue.h"
 #include "evpose/run/plausibility.h"
 #include "evpose/run/presets.h"
 #include "evpose/run/progress.h"
@@ -158,6 +157,19 @@ Expected<OpenedMap> open_map_of(const TrackRequest& request, const RunConfig& co
   return path ? open_map(*path, start_map, config.tracker) : path.error();
 }
 
+/// A recording of frames alone is tracked by them.
+Status choose_frame_use(const Recording& recording, FrameUse& use) {
+  if (recording.frames_path.empty() && use == FrameUse::alone)
+    return Error{recording.folder, "has no frames, which frames.use=alone asks for",
+                 "put frames/timestamps.csv there, or name a list under files.frames in recording.yaml"};
+  if (!recording.events_path.empty()) return {};
+  if (use == FrameUse::off)
+    return Error{recording.folder, "has frames and no events, and frames.use is off",
+                 "leave frames.use as it is"};
+  use = FrameUse::alone;
+  return {};
+}
+
 }  // namespace
 
 Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config, const Recording& recording,
@@ -166,6 +178,8 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
   if (!camera) return Error{recording.calibration_path, camera.error().what, camera.error().fix};
   TrackJob job;
   job.config = config;
+  if (auto status = choose_frame_use(recording, job.config.tracker.frames.use); !status)
+    return status.error();
   const auto start = choose_start(request.init, recording, truth,
                                   {request.init_sigma[0], request.init_sigma[1]}, &job.config.tracker.fusion);
   if (!start) return start.error();
@@ -183,7 +197,8 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
                recording.camera,
                recording.calibration_sigma,
                map->parts,
-               start->T_map_body.p};
+               start->T_map_body.p,
+               recording.frame_camera};
   job.start_words = start_words(request.init, !job.truth.empty());
   for (const auto& doubt : {doubt_map_size(*map->map), doubt_start_place(*map->map, start->T_map_body)})
     if (doubt) job.findings.push_back(*doubt);
@@ -294,40 +309,6 @@ RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tra
       {"compiler", __VERSION__},
       {"eigen", text(EIGEN_WORLD_VERSION, ".", EIGEN_MAJOR_VERSION, ".", EIGEN_MINOR_VERSION)}};
   return summary;
-}
-
-Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
-                      const std::function<bool(double)>& progress) {
-  auto reader = open_events(recording, 1e-3 * config.packet_ms);
-  if (!reader) return reader.error();
-  std::unique_ptr<ImuReader> imu;
-  if (recording.has_imu) {
-    auto opened = open_imu(recording);
-    if (!opened) return opened.error();
-    imu = std::make_unique<ImuReader>(std::move(*opened));
-  }
-  std::unique_ptr<PacketQueue> ahead;
-  if (config.tracker.threads > 1) ahead = std::make_unique<PacketQueue>(**reader);
-  EventPacket packet;
-  ImuSample sample;
-  TimeNs imu_until = std::numeric_limits<TimeNs>::min();
-  while (true) {
-    const auto more = ahead ? ahead->next(packet) : (*reader)->next(packet);
-    if (!more) return more.error();
-    if (!*more) return {};
-    const TimeNs end = packet.time(packet.events.back());
-    while (imu && imu_until <= end) {
-      const auto another = imu->next(sample);
-      if (!another) return another.error();
-      if (!*another) break;
-      tracker.add_imu(sample);
-      imu_until = sample.t;
-    }
-    tracker.add_events(packet);
-    if (progress && !progress(to_seconds(end - recording.first_ns) /
-                              std::max(1e-9, to_seconds(recording.last_ns - recording.first_ns))))
-      return {};
-  }
 }
 
 Expected<RunOutcome> track_recording(const TrackRequest& request) {

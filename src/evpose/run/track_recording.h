@@ -62,8 +62,8 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
                             std::vector<TimedPose> truth);
 /// Reads and checks everything but the events.
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
-/// Gives the tracker both streams of the recording, the IMU ahead so that no event has to wait for it.
-/// `progress`, if any, is told the share of the recording, 0..1, and ends it by false.
+/// Gives the tracker the streams of the recording, IMU and frames ahead so that no event has to wait for
+/// them. `progress`, if any, is told the share of the recording, 0..1, and ends it by false.
 Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
                       const std::function<bool(double)>& progress);
 /// What was given of the calibration and is known of it in the end; none: it counted as known.

@@ -130,6 +130,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   // told, not to how far a contour may lie from where it is looked for.
   const PoseUncertainty uncertainty(state, e.focal_px, e.typical_depth_m);
   take_verdict(e.span_s);
+  verified_ |= e.frames_confirm && !searching();
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
   Evidence evidence;
   evidence.t = e.t;
@@ -144,7 +145,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.hopeless = is_hopeless();
   if (is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
   const Health health = health_.judge(evidence, reason);
-  astray_s_ = is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
+  astray_s_ = !e.frames_confirm && is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
   if (verification_is_over(e.t) && (verified_ || refuted)) verify_until_ = 0;
   if (refuted) resume_search(e.t, fusion);
   if (search_is_due()) begin_search(e.t, fusion, state.pose_covariance());

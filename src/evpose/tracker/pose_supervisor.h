@@ -22,6 +22,7 @@ struct UpdateEvidence {
   std::string fault;    ///< what is wrong with the data, if anything
   double typical_depth_m = 0;
   double focal_px = 0;
+  bool frames_confirm = false;  ///< frames have shown the contours where the pose has them
 };
 
 /// Owns the decision whether the pose is known: searches it when it is not, verifies one that was found,

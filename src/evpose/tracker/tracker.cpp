@@ -78,8 +78,9 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
       registration_(make_registration(config, setup_.camera->size(), *setup_.map, map_.segments)),
+      frames_(make_frame_input(config, setup_, map_.segments)),
       fusion_(std::move(fusion)),
-      supervisor_(config.relocalization, config.health,
+      supervisor_(relocalization_config(config), config.health,
                   Relocalizer({map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                                config.visible, config.event_registration}),
                   PoseVerifier(setup_.camera->size(), map_.segments.count,
@@ -95,7 +96,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());
   supervisor_.start(fusion_->state(), uncertainty.sigma_px());
   const CalibrationConfig& uncertain = config.fusion.calibration;
-  if (uncertain.intrinsics || uncertain.rotation || uncertain.translation)
+  const bool by_events = config.frames.use != FrameUse::alone;
+  if (by_events && (uncertain.intrinsics || uncertain.rotation || uncertain.translation))
     start_alignment_.emplace(
         RelocalizerScene{map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                          config.visible, config.event_registration},
@@ -108,6 +110,11 @@ void Tracker::add_imu(const ImuSample& sample) {
   imu_rate_output_.add(imu_.add(sample, fusion_->state().t));
   imu_rate_output_.report_until(imu_time(next_update_), *fusion_, imu_);
   make_due_updates();
+}
+
+void Tracker::add_frame(Frame frame) {
+  EVPOSE_CHECK(frame.size == setup_.camera->size());
+  if (frames_) frames_->add(std::move(frame));
 }
 
 void Tracker::add_events(const EventPacket& packet) {
@@ -186,6 +193,7 @@ void Tracker::page_map() {
   map_ = std::move(next->prepared);
   contours_.renumber(next->point_now);
   registration_->rearrange_segments(next->segment_before, next->contrast);
+  if (frames_) frames_->rearrange_segments(next->segment_before, next->contrast);
   supervisor_.rearrange(next->segment_before);
 }
 
@@ -203,6 +211,7 @@ void Tracker::see_contours(double span_s) {
 /// Where the map has them, or where their segments are known to stand.
 void Tracker::project_samples(const FusionState& state, double span_s) {
   contours_.project(state, span_s);
+  projected_ = state.nav;
   if (!map_.offset_segments.empty())
     contours_.displace(
         [this](std::uint32_t point) { return fusion_->displacement_of(map_.offset_segments[point]); });
@@ -217,14 +226,15 @@ Update Tracker::update(TimeNs t) {
   see_contours(span_s);
   reporter_.end_stage(&StageTimes::predict_s);
   const bool aligning = align_start(t, moved);
-  const RegistrationResult stpe =
+  RegistrationResult stpe =
       supervisor_.searching() || aligning ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
   reporter_.end_stage(&StageTimes::register_s);
   const double innovation =
       evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
   std::string refused = aligning ? kAligning : supervisor_.refusal(t, stpe, innovation);
   if (imu_time(t) < from) refused = kTimeIsPast;
-  if (refused.empty()) fuse(stpe);  // eq. (3), (5), (6)
+  if (refused.empty()) fuse(stpe, registration_->offsets(), frames_ ? frames_->share_of_events() : 1);
+  if (fuse_frame(t, aligning, stpe)) refused.clear();
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty());
   judge(t, span_s, stpe, refused);
@@ -241,6 +251,7 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   if (!found) return;
   fusion_->start(*found);
   registration_->restart();
+  if (frames_) frames_->restart();
   imu_.restart_comparison();
   contours_.choose(found->nav.T_map_body);
 }
@@ -303,7 +314,8 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
 /// +1: it is darker where the map's normal points, -1: brighter, 0: not known.
 int Tracker::darker_side(std::uint32_t segment) const {
   const ContrastMemory* contrast = registration_->contrast();
-  return contrast == nullptr ? 0 : -contrast->map_contrast(segment);
+  const int by_events = contrast == nullptr ? 0 : contrast->map_contrast(segment);
+  return -(by_events == 0 && frames_ ? frames_->contrast(segment) : by_events);
 }
 
 ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concentration) const {
@@ -325,12 +337,39 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concent
   return out;
 }
 
-void Tracker::fuse(const RegistrationResult& measurement) {
+/// With a frame that has been exposed since the last update, if there is one and it is believed. Where no
+/// events were used, `measured` becomes what it says.
+bool Tracker::fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured) {
+  if (!frames_) return false;
+  const auto found = aligning || supervisor_.searching() ? std::nullopt : frames_->measure(t, frame_view());
+  const bool used =
+      found &&
+      frames_->refusal(*found, fusion_->measured_covariance(), config_.health.innovation_gate).empty();
+  if (used) fuse(*found, frames_->offsets());
+  if (used && measured.inliers == 0) measured = *found;
+  frames_->remember(t, fusion_->state());
+  return used;
+}
+
+/// What a frame is measured with: the contours, and the state since they were projected.
+FrameInput::Seen Tracker::frame_view() const {
+  const NavState& now = fusion_->state().nav;
+  return {contours_.samples(),
+          fusion_->measured_covariance(),
+          {now.T_map_body.minus(projected_.T_map_body), now.velocity - projected_.velocity},
+          fusion_->state()};
+}
+
+/// With a share of its information.
+void Tracker::fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets,
+                   double share) {
   offsets_.clear();
   if (fusion_->takes_contours())
-    for (const SampleOffset& offset : registration_->offsets())
+    for (SampleOffset offset : offsets) {
+      offset.weight *= share;
       offsets_.push_back(contour_offset(offset, measurement.gate_concentration));
-  fusion_->update({measurement.information, measurement.vector}, offsets_);
+    }
+  fusion_->update({share * measurement.information, share * measurement.vector}, offsets_);
   take_calibration();
 }
 
@@ -338,9 +377,10 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
                     const std::string& refused) {
   Matrix6d covariance = fusion_->reported_state().pose_covariance();
   std::string reason;
-  const Health health = supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement),
-                                           contours_.typical_depth_m(), setup_.camera->focal_px()},
-                                          *fusion_, &reason);
+  const Health health =
+      supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement), contours_.typical_depth_m(),
+                         setup_.camera->focal_px(), frames_confirm(t)},
+                        *fusion_, &reason);
   covariance += supervisor_.doubt();
   reporter_.add_judgement(health, std::move(reason), covariance);
 }
@@ -350,34 +390,8 @@ std::string Tracker::fault(TimeNs t, const RegistrationResult& measurement) cons
   if (std::string imu = imu_.fault(t); !imu.empty()) return imu;
   if (reporter_.most_events_shed(preprocessor_.counts()))
     return "more events than are taken (events.most_mev_s)";
-  if (!measurement.consistent) return "events do not gather at the contours";
+  if (!measurement.consistent && !frames_confirm(t)) return "events do not gather at the contours";
   return imu_.contradicts(t) ? "IMU contradicts the camera" : "";
-}
-
-ContourMap Tracker::map_with_learnt_contrast() const {
-  ContourMap out = *map_.map;
-  const ContrastMemory* learnt = registration_->contrast();
-  for (std::size_t i = 0; learnt != nullptr && i < out.points.size(); ++i)
-    if (const int sign = learnt->map_contrast(map_.segments.of_point[i]); sign != 0)
-      out.points[i].contrast = static_cast<std::int8_t>(sign);
-  return out;
-}
-
-Snapshot Tracker::snapshot(double decay_s) const {
-  Snapshot out;
-  out.size = setup_.camera->size();
-  const auto pixels = static_cast<std::size_t>(out.size.width) * static_cast<std::size_t>(out.size.height);
-  out.decay = preprocessor_.surface() != nullptr
-                  ? decayed(*preprocessor_.surface(), preprocessor_.stamp(fusion_->state().t), decay_s)
-                  : std::vector<float>(pixels);
-  out.points = chosen_points(decay_s);
-  return out;
-}
-
-std::vector<Snapshot::Point> Tracker::chosen_points(double decay_s) const {
-  const FusionState& state = fusion_->state();
-  return project_points(contours_.view(), contours_.points(), state.nav.T_map_body, preprocessor_.surface(),
-                        preprocessor_.stamp(state.t), decay_s);
 }
 
 }  // namespace evpose

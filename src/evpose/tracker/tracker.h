@@ -12,6 +12,7 @@
 #include "evpose/core/error.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/contour_selection.h"
+#include "evpose/tracker/frame_input.h"
 #include "evpose/tracker/imu_gate.h"
 #include "evpose/tracker/imu_rate_output.h"
 #include "evpose/tracker/input_queue.h"
@@ -40,6 +41,7 @@ struct TrackerSetup {
   /// to part_radius_m(). None: `map` is all of it.
   MapParts map_parts = {};
   Eigen::Vector3d map_middle = Eigen::Vector3d::Zero();
+  FrameCamera frame_camera = {};  ///< of frames, if there are any
 };
 
 /// Out to where a part of a map has to reach around the camera.
@@ -78,6 +80,9 @@ class Tracker {
   /// In order of time. An update is made as soon as both streams have passed its time.
   void add_imu(const ImuSample& sample);
   void add_events(const EventPacket& packet);
+  /// Of the size of the camera, in order of time, before the events after its exposure; one that comes later
+  /// is measured late. Nothing if frames are not to be used.
+  void add_frame(Frame frame);
   /// All events up to t have been added: updates up to t need not wait for a later event.
   void events_complete_until(TimeNs t);
 
@@ -123,7 +128,10 @@ class Tracker {
   RegistrationResult measure(TimeNs t, double span_s);
   int darker_side(std::uint32_t segment) const;
   ContourOffset contour_offset(const SampleOffset& offset, double concentration) const;
-  void fuse(const RegistrationResult& measurement);
+  bool fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured);
+  FrameInput::Seen frame_view() const;
+  void fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets, double share = 1);
+  bool frames_confirm(TimeNs t) const { return frames_ && frames_->confirms(t); }
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);
   std::string fault(TimeNs t, const RegistrationResult& measurement) const;
 
@@ -134,12 +142,14 @@ class Tracker {
   PreparedMap map_;
   MapPager pager_;
   ContourSelection contours_;
-  std::optional<NavState> forecast_;  ///< that the contours were projected at, and events are looked at with
+  NavState projected_;                ///< that the contours were projected at
+  std::optional<NavState> forecast_;  ///< the same, where events are looked at with it as they come
   InterestMap interest_;
   EventPreprocessor preprocessor_;
   InputQueue input_;
   ImuGate imu_;
   std::unique_ptr<Registration> registration_;
+  std::optional<FrameInput> frames_;  ///< none: they are not used
   std::unique_ptr<BackEnd> fusion_;
   PoseSupervisor supervisor_;
   std::optional<StartAlignment> start_alignment_;  ///< until it is done

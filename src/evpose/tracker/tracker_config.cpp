@@ -18,6 +18,7 @@ void describe(ConfigTable& table, TrackerConfig& c) {
             "(EV-Pose 4.2)");
   table.group("registration", c.event_registration);
   table.group("temporal_field", c.temporal_field);
+  table.group("frames", c.frames);
   table.group("fusion", c.fusion);
   table.group("imu", c.imu);
   table.group("relocalization", c.relocalization);

@@ -6,6 +6,7 @@
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/event_registration.h"
 #include "evpose/registration/temporal_field_registration.h"
+#include "evpose/tracker/frame_input.h"
 #include "evpose/tracker/health.h"
 #include "evpose/tracker/imu_gate.h"
 #include "evpose/tracker/relocalizer.h"
@@ -22,6 +23,7 @@ struct TrackerConfig {
   RegistrationKind registration = RegistrationKind::events;
   EventRegistrationConfig event_registration;
   TemporalFieldConfig temporal_field;
+  FrameUseConfig frames;
   FusionConfig fusion;
   ImuWatchConfig imu;
   RelocalizationConfig relocalization;

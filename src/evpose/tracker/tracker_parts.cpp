@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "evpose/registration/contrast_memory.h"
+
 namespace evpose {
 namespace {
 
@@ -46,6 +48,27 @@ std::unique_ptr<Registration> make_registration(const TrackerConfig& config, Ima
   const PolarityConfig polarity{events.polarity, events.buffer_sigma};
   return seeded(std::make_unique<TemporalFieldRegistration>(config.temporal_field, polarity, segments.count,
                                                             config.threads));
+}
+
+std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const TrackerSetup& setup,
+                                           const ContourSegments& segments) {
+  if (config.frames.use == FrameUse::off) return {};
+  return FrameInput(setup.camera->size(), setup.frame_camera, contrast_of_segments(*setup.map, segments));
+}
+
+ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,
+                         const ContrastMemory* learnt) {
+  ContourMap out = map;
+  for (std::size_t i = 0; learnt != nullptr && i < out.points.size(); ++i)
+    if (const int sign = learnt->map_contrast(segments.of_point[i]); sign != 0)
+      out.points[i].contrast = static_cast<std::int8_t>(sign);
+  return out;
+}
+
+RelocalizationConfig relocalization_config(const TrackerConfig& config) {
+  RelocalizationConfig out = config.relocalization;
+  out.on = out.on && config.frames.use != FrameUse::alone;
+  return out;
 }
 
 Status check_start(const ContourMap& map, const StartState& start, double far_m) {

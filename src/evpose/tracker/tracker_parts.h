@@ -18,6 +18,17 @@ VisibleSetConfig visible_config(const TrackerConfig& config);
 std::unique_ptr<Registration> make_registration(const TrackerConfig& config, ImageSize size,
                                                 const ContourMap& map, const ContourSegments& segments);
 
+/// None where frames are not to be used.
+std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const TrackerSetup& setup,
+                                           const ContourSegments& segments);
+
+/// The map with the signs that were learnt; null: none were.
+ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,
+                         const ContrastMemory* learnt);
+
+/// Without events no pose can be searched.
+RelocalizationConfig relocalization_config(const TrackerConfig& config);
+
 /// Error: not finite, or further than `far_m` from the map.
 Status check_start(const ContourMap& map, const StartState& start, double far_m);
 

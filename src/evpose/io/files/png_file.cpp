@@ -4,9 +4,11 @@
 #include <png.h>
 
 #include <csetjmp>
+#include <cstring>
 #include <unordered_map>
 
 #include "evpose/io/files/atomic_file.h"
+#include "evpose/io/files/input_file.h"
 
 namespace evpose {
 namespace {
@@ -80,6 +82,71 @@ Status write_grey(const std::string& path, const Pixels& pixels) {
   return write_text_file(path, bytes);
 }
 
+/// What is left to be read of a file that is in memory.
+struct Bytes {
+  const char* at;
+  std::size_t left;
+};
+
+void take(png_structp png, png_bytep to, png_size_t count) {
+  auto& bytes = *static_cast<Bytes*>(png_get_io_ptr(png));
+  if (count > bytes.left) png_error(png, "the file ends too early");
+  std::memcpy(to, bytes.at, count);
+  bytes.at += count, bytes.left -= count;
+}
+
+void say_nothing(png_structp, png_const_charp) {}
+
+[[noreturn]] void give_up(png_structp png, png_const_charp) { png_longjmp(png, 1); }
+
+void make_grey8(png_structp png, png_infop info) {
+  png_set_expand(png);
+  png_set_scale_16(png);
+  png_set_strip_alpha(png);
+  if ((png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR) != 0)
+    png_set_rgb_to_gray(png, PNG_ERROR_ACTION_NONE, -1, -1);
+  png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+}
+
+constexpr png_uint_32 kMostAlongSide = 16'384;
+
+/// False for what is no sound PNG. `rows` is the caller's, since a fault leaves by a long jump.
+bool decode_grey8(Bytes bytes, GreyImage& image, std::vector<png_bytep>& rows) {
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, give_up, say_nothing);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
+    png_destroy_read_struct(&png, &info, nullptr);
+    return false;
+  }
+  png_set_user_limits(png, kMostAlongSide, kMostAlongSide);
+  png_set_read_fn(png, &bytes, take);
+  png_read_info(png, info);
+  make_grey8(png, info);
+  image.width = static_cast<int>(png_get_image_width(png, info));
+  image.height = static_cast<int>(png_get_image_height(png, info));
+  const auto width = static_cast<std::size_t>(image.width);
+  if (png_get_rowbytes(png, info) != width) png_error(png, "not grey");
+  image.pixels.resize(width * static_cast<std::size_t>(image.height));
+  for (std::size_t y = 0; y < static_cast<std::size_t>(image.height); ++y)
+    rows.push_back(image.pixels.data() + y * width);
+  png_read_image(png, rows.data());
+  png_destroy_read_struct(&png, &info, nullptr);
+  return true;
+}
+
+/// A pixel takes no less than a thousandth of a byte: what promises more is no picture.
+bool fits(const std::string& bytes) {
+  constexpr std::size_t kWidthAt = 16, kHeader = 33;
+  if (bytes.size() < kHeader) return false;
+  const auto number = [&](std::size_t at) {
+    std::uint64_t out = 0;
+    for (std::size_t i = 0; i < 4; ++i) out = (out << 8) | static_cast<std::uint8_t>(bytes[at + i]);
+    return out;
+  };
+  return number(kWidthAt) * number(kWidthAt + 4) <= 1100 * bytes.size();
+}
+
 }  // namespace
 
 std::string encode_png(const RgbImage& image) {
@@ -108,6 +175,17 @@ Status write_png_grey16(const std::string& path, int width, int height,
                            .height = height,
                            .bits = 16,
                            .bytes = reinterpret_cast<const std::uint8_t*>(pixels.data())});
+}
+
+Expected<GreyImage> read_png_grey8(const std::string& path) {
+  constexpr std::size_t kMostBytes = 256 << 20;
+  const auto bytes = first_bytes(path, kMostBytes);
+  if (!bytes) return bytes.error();
+  GreyImage image;
+  std::vector<png_bytep> rows;
+  if (!fits(*bytes) || !decode_grey8({bytes->data(), bytes->size()}, image, rows))
+    return Error{path, "is no PNG picture, or a damaged one", "convert it to PNG, or copy it again"};
+  return image;
 }
 
 }  // namespace evpose

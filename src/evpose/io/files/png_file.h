@@ -34,4 +34,13 @@ Status write_png_grey8(const std::string& path, int width, int height,
 Status write_png_grey16(const std::string& path, int width, int height,
                         const std::vector<std::uint16_t>& pixels);
 
+struct GreyImage {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;  ///< row by row, from the top
+};
+
+/// Any PNG as grey levels: colours by their luma, 16 bits scaled to 8, transparency left out. Errors: as of
+/// open_to_read(), no PNG or a damaged one, more than 16,384 pixels along a side.
+Expected<GreyImage> read_png_grey8(const std::string& path);
+
 }  // namespace evpose

@@ -78,5 +78,51 @@ TEST(Png, GreyOfEitherDepthDecodesToTheSameSamples) {
   EXPECT_EQ(read_grey<std::uint16_t>(folder / "16.png", 7, 4), words);
 }
 
+TEST(Png, ReadingGreyUndoesWriting) {
+  const TemporaryFolder folder;
+  std::vector<std::uint8_t> bytes(7 * 4);
+  std::iota(bytes.begin(), bytes.end(), std::uint8_t{200});
+  ASSERT_TRUE(write_png_grey8(folder / "8.png", 7, 4, bytes).ok());
+  const auto read = read_png_grey8(folder / "8.png");
+  ASSERT_TRUE(read.ok()) << read.error().line();
+  EXPECT_EQ(read->width, 7);
+  EXPECT_EQ(read->height, 4);
+  EXPECT_EQ(read->pixels, bytes);
+  std::vector<std::uint16_t> words;
+  for (const std::uint8_t b : bytes) words.push_back(static_cast<std::uint16_t>(257 * b));
+  ASSERT_TRUE(write_png_grey16(folder / "16.png", 7, 4, words).ok());
+  EXPECT_EQ(read_png_grey8(folder / "16.png")->pixels, bytes);
+}
+
+/// Eight colours, which have a palette, or a thousand, which have none; grey ones keep their level.
+TEST_P(PngColours, AreReadByTheirLuma) {
+  const TemporaryFolder folder;
+  RgbImage image(40, 30);
+  std::mt19937 random(1);
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+    for (std::size_t k = 0; k < 3; ++k)
+      image.rgb[i + k] =
+          k == 0 ? static_cast<std::uint8_t>(random() % static_cast<unsigned>(GetParam())) : image.rgb[i];
+  folder.file("it.png", encode_png(image));
+  const auto read = read_png_grey8(folder / "it.png");
+  ASSERT_TRUE(read.ok()) << read.error().line();
+  for (std::size_t i = 0; i < read->pixels.size(); ++i) ASSERT_EQ(read->pixels[i], image.rgb[3 * i]) << i;
+}
+
+TEST(Png, DamagedOnesAreRefused) {
+  const TemporaryFolder folder;
+  const std::string good = encode_png(RgbImage(40, 30, 7));
+  for (std::size_t size = 0; size < good.size() - 12; size += 5) {  // the last twelve bytes are its end
+    folder.file("cut.png", good.substr(0, size));
+    EXPECT_FALSE(read_png_grey8(folder / "cut.png").ok()) << size;
+  }
+  std::string vast = good;
+  vast[17] = 0x7F;  // of its width
+  folder.file("vast.png", vast);
+  const auto refused = read_png_grey8(folder / "vast.png");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().line().find("vast.png"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace evpose

@@ -264,7 +264,7 @@ std::optional<std::string> find_imu(const Look& look) {
   for (const std::string& name : look.files()) {
     const std::string own = base_name(name);
     const bool kind = own.ends_with(".csv") || own.ends_with(".txt");
-    if (!kind || own.find("imu") == std::string::npos) continue;
+    if (!kind || name.find("imu") == std::string::npos) continue;
     if (recognise_imu_text(look.path(name))) return name;
   }
   for (const std::string& name : look.files())
@@ -305,6 +305,13 @@ bool holds(const std::string& path, StreamKind kind) {
          });
 }
 
+/// The list of frames, ours or as EuRoC has it.
+std::optional<std::string> find_frames(const Look& look) {
+  for (const char* usual : {"frames/timestamps.csv", "cam0/data.csv", "mav0/cam0/data.csv"})
+    if (look.has(usual)) return usual;
+  return std::nullopt;
+}
+
 /// Fills what recording.yaml or an own layout has not named.
 void look_for_the_rest(const Look& look, FoundRecording& out) {
   RecordingOverrides& f = out.files;
@@ -321,6 +328,7 @@ void look_for_the_rest(const Look& look, FoundRecording& out) {
     if (!f.groundtruth && f.events && holds(look.path(*f.events), StreamKind::poses))
       f.groundtruth = f.events;
   }
+  if (!f.frames) f.frames = find_frames(look);
   if (!f.contours && !look.has("contours.ply")) f.contours = look.find("contours.ply");
 }
 
@@ -343,7 +351,7 @@ Expected<FoundRecording> look_at_folder(const std::string& folder) {
   }
   if (out.layout.empty()) out.layout = "recording folder";
   look_for_the_rest(look, out);
-  if (!out.files.events && !look.has("events.h5"))
+  if (!out.files.events && !look.has("events.h5") && !out.files.frames)
     miss(out, look.path("events.h5"), "no such file",
          "add the events, or name another file under files: in recording.yaml");
   if (!out.files.calibration && !look.has("camchain-imucam.yaml") && !out.camera)

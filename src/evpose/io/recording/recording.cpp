@@ -43,7 +43,9 @@ Status take_files(const FoundRecording& found, Recording& r) {
   r.name = files.name;
   r.layout = found.layout;
   r.missing = found.missing;
-  r.events_path = r.folder + "/" + files.events.value_or("events.h5");
+  r.frames_path = files.frames ? r.folder + "/" + *files.frames : "";
+  r.events_path = r.frames_path.empty() ? r.folder + "/" + files.events.value_or("events.h5")
+                                        : optional_file(r.folder, files.events, "events.h5");
   r.calibration_path = r.folder + "/" +
                        (found.calibration_files.empty() ? files.calibration.value_or("camchain-imucam.yaml")
                                                         : found.calibration_files.front());
@@ -57,8 +59,8 @@ Status take_files(const FoundRecording& found, Recording& r) {
 }
 
 Status check_files(const Recording& r) {
-  for (const std::string& path : {r.events_path, r.calibration_path, r.imu_path, r.imu_model_path,
-                                  r.groundtruth_path, r.contours_path, r.map_path}) {
+  for (const std::string& path : {r.events_path, r.frames_path, r.calibration_path, r.imu_path,
+                                  r.imu_model_path, r.groundtruth_path, r.contours_path, r.map_path}) {
     if (path.empty() || exists(path)) continue;
     // What the look at the folder said about it knows better where it comes from.
     for (const Error& missing : r.missing)
@@ -75,7 +77,7 @@ Expected<CalibratedCamera> read_camera(const Recording& r, const RecordingOverri
   if (!calibration) return calibration.error();
   noise = calibration->imu_noise;
   for (CalibratedCamera& camera : calibration->cameras) {
-    if (!camera.intrinsics || camera.intrinsics->size != ImageSize{}) continue;
+    if (!camera.intrinsics || camera.intrinsics->size != ImageSize{} || r.events_path.empty()) continue;
     const auto events = open_events(r.events_path, files.events_format, files.event_options);
     if (!events) return events.error();
     camera.intrinsics->size = (*events)->size();
@@ -152,6 +154,12 @@ void take_options(const RecordingOverrides& overrides, Recording& r) {
   if (overrides.t_start_s)
     r.event_options.t_start_ns = r.imu_options.t_start_ns = from_seconds(*overrides.t_start_s);
   if (overrides.t_end_s) r.event_options.t_end_ns = r.imu_options.t_end_ns = from_seconds(*overrides.t_end_s);
+  r.frame_options = overrides.frame_options;
+  r.frame_options.offset_ns = r.event_options.offset_ns;
+  r.frame_options.t_start_ns = r.event_options.t_start_ns;
+  r.frame_options.t_end_ns = r.event_options.t_end_ns;
+  r.frame_options.size = r.camera.size;
+  r.frame_camera = overrides.frame_camera;
   r.T_ned_map = overrides.T_ned_map;
   r.initial_pose = overrides.initial_pose;
 }
@@ -171,6 +179,18 @@ Status probe_events(Recording& r) {
   r.first_ns = extent.first_ns;
   r.last_ns = extent.last_ns;
   r.event_count = extent.count;
+  return {};
+}
+
+/// The list of frames; their span is that of the recording where there are no events.
+Status probe_frames(Recording& r) {
+  if (r.frames_path.empty()) return {};
+  const auto reader = open_frames(r);
+  if (!reader) return reader.error();
+  if (!r.events_path.empty()) return {};
+  if (reader->rows().empty()) return Error{r.frames_path, "no frames inside the crop", "choose other times"};
+  r.first_ns = reader->rows().front().t;
+  r.last_ns = reader->rows().back().t;
   return {};
 }
 
@@ -278,7 +298,9 @@ Expected<Recording> open_unjoined_recording(const std::string& path, const std::
   if (auto status = take_groundtruth(found->files, yaml, r); !status) return status.error();
   if (auto status = take_imu(found->files, r); !status) return status.error();
   take_options(found->files, r);
-  if (auto status = probe_events(r); !status) return status.error();
+  if (!r.events_path.empty())
+    if (auto status = probe_events(r); !status) return status.error();
+  if (auto status = probe_frames(r); !status) return status.error();
   if (auto status = crop(yaml, r); !status) return status.error();
   if (r.has_imu) {
     if (auto status = check_imu(found->files, r); !status) return status.error();
@@ -287,9 +309,16 @@ Expected<Recording> open_unjoined_recording(const std::string& path, const std::
 }
 
 Expected<std::unique_ptr<EventReader>> open_events(const Recording& recording, double packet_s) {
+  if (recording.events_path.empty())
+    return Error{recording.folder, "has frames and no events", "give a recording with events"};
   EventReadOptions options = recording.event_options;
   options.packet_s = packet_s;
   return open_events(recording.events_path, recording.events_format, options);
+}
+
+Expected<FrameReader> open_frames(const Recording& recording) {
+  EVPOSE_CHECK(!recording.frames_path.empty());
+  return FrameReader::open(recording.frames_path, recording.frame_options);
 }
 
 Expected<ImuReader> open_imu(const Recording& recording) {

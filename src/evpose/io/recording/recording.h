@@ -13,6 +13,7 @@
 #include "evpose/imu/imu.h"
 #include "evpose/io/events/event_reader.h"
 #include "evpose/io/motion/imu_csv.h"
+#include "evpose/io/recording/frame_reader.h"
 
 namespace evpose {
 
@@ -38,7 +39,11 @@ struct Recording {
   bool has_imu = false;
   ImuNoise imu_noise;
 
-  std::string events_path, calibration_path;              ///< the first where a calibration has several files
+  std::string events_path;         ///< empty: frames alone
+  std::string calibration_path;    ///< the first where a calibration has several files
+  std::string frames_path;         ///< list of frames through the event camera's pixels; empty: none
+  FrameReadOptions frame_options;  ///< offset, crop and size filled in
+  FrameCamera frame_camera;
   std::string imu_path, imu_model_path;                   ///< empty without IMU
   std::string groundtruth_path, contours_path, map_path;  ///< empty: none
   std::string events_format;                              ///< of event_formats.h; empty: found by content
@@ -46,8 +51,9 @@ struct Recording {
   ImuReadOptions imu_options;
   std::shared_ptr<const std::vector<ImuSample>> imu_samples;  ///< set where a file holds more than the IMU
 
-  TimeNs first_ns = 0, last_ns = 0;  ///< common span of events and IMU, inside the crop, on the IMU's clock
-  std::int64_t event_count = -1;     ///< of the whole file; -1: not known
+  TimeNs first_ns = 0,
+         last_ns = 0;  ///< common span of events (or frames) and IMU, inside the crop, on the IMU's clock
+  std::int64_t event_count = -1;  ///< of the whole file; -1: not known
   std::optional<Error>
       clocks_apart;  ///< events and IMU have no time in common; see open_unjoined_recording()
 
@@ -70,7 +76,11 @@ Expected<Recording> open_recording(const std::string& path, const std::string& c
 /// last_ns are of the events alone.
 Expected<Recording> open_unjoined_recording(const std::string& path, const std::string& calibration = "");
 
+/// Error: it has frames alone.
 Expected<std::unique_ptr<EventReader>> open_events(const Recording& recording, double packet_s = 1e-3);
+
+/// A fault of ours without frames.
+Expected<FrameReader> open_frames(const Recording& recording);
 
 /// A fault of ours without IMU.
 Expected<ImuReader> open_imu(const Recording& recording);

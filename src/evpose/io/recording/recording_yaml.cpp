@@ -35,12 +35,14 @@ class Keys {
   void add_imu();
   void add_time();
   void add_frames();
+  void add_frame_camera();
   Apply file(std::optional<std::string>& target) const;
   Apply text_value(std::string& target) const;
   Apply flag(bool& target) const;
   Apply choice(std::vector<std::string> choices, std::function<void(const std::string&)> set) const;
   Apply seconds(std::optional<double>& target, double limit) const;
   Apply transform(std::optional<Pose>& target) const;
+  Apply number(double min, double max, const char* unit, std::function<void(double)> set) const;
   Status event_format(const YamlNode& node, const std::string& key) const;
   Status resolution(const YamlNode& node, const std::string& key) const;
   Status initial_pose(const YamlNode& node) const;
@@ -70,6 +72,7 @@ Keys::Keys(const YamlDocument& document, RecordingOverrides& out) : document_(do
   add_imu();
   add_time();
   add_frames();
+  add_frame_camera();
 }
 
 void Keys::add_files() {
@@ -80,6 +83,7 @@ void Keys::add_files() {
   keys_["files.imu_model"] = file(out_.imu_model);
   keys_["files.contours"] = file(out_.contours);
   keys_["files.map"] = file(out_.map);
+  keys_["files.frames"] = file(out_.frames);
 }
 
 void Keys::add_events() {
@@ -154,6 +158,18 @@ void Keys::add_frames() {
   };
   for (const char* part : {"t_ns", "p", "q_xyzw", "sigma_p", "sigma_q_deg"})
     keys_[std::string("initial_pose.") + part] = nullptr;  // read together, by initial_pose()
+}
+
+void Keys::add_frame_camera() {
+  keys_["frame_camera.gamma"] = number(0.2, 5, "", [this](double v) { out_.frame_camera.gamma = v; });
+  keys_["frame_camera.row_time_us"] =
+      number(-1000, 1000, "us", [this](double v) { out_.frame_camera.row_time_s = 1e-6 * v; });
+  keys_["frame_camera.exposure_ms"] =
+      number(0, 1000, "ms", [this](double v) { out_.frame_options.exposure = from_seconds(1e-3 * v); });
+  keys_["frame_camera.stamp"] = choice({"start", "middle", "end"}, [this](const auto& v) {
+    using Stamp = FrameReadOptions::Stamp;
+    out_.frame_options.stamp = v == "start" ? Stamp::start : v == "end" ? Stamp::end : Stamp::middle;
+  });
 }
 
 Status Keys::apply(const YamlNode& node, const std::string& prefix) const {
@@ -234,6 +250,18 @@ Apply Keys::seconds(std::optional<double>& target, double limit) const {
     if (std::abs(*value) > limit)
       return document_.error(node, text(key, ": ", *value, " s is out of range"), "give seconds");
     target = *value;
+    return {};
+  };
+}
+
+Apply Keys::number(double min, double max, const char* unit, std::function<void(double)> set) const {
+  return [=, this, set = std::move(set)](const YamlNode& node, const std::string& key) -> Status {
+    const auto value = document_.number(node, key);
+    if (!value) return value.error();
+    if (!(*value >= min && *value <= max))
+      return document_.error(node, text(key, ": ", *value, " is out of range"),
+                             text("give a number from ", min, " to ", max, " ", unit));
+    set(*value);
     return {};
   };
 }

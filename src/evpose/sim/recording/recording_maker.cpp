@@ -225,7 +225,8 @@ Status RecordingMaker::expose(const PreparedScene& prepared, const Camera& camer
   const std::vector<float> gain = lens_gain(scenario_.camera);
   auto sink = EventSink::create(folder_, camera.size(), scenario_.truth.events, prepared.scene);
   if (!sink) return sink.error();
-  auto frames = FrameCamera::create(folder_, gain, camera.size(), scenario_.frames, end);
+  auto frames = FrameCamera::create(folder_, gain, camera.size(), scenario_.frames, end,
+                                    static_cast<std::uint64_t>(scenario_.seed));
   if (!frames) return frames.error();
   EventPixels pixels(camera.size(), scenario_.events, static_cast<std::uint64_t>(scenario_.seed), gain);
   ReadOut read_out(camera.size(), scenario_.read_out, static_cast<std::uint64_t>(scenario_.seed));

@@ -13,6 +13,8 @@
 namespace evpose::sim {
 namespace {
 
+constexpr double kReadNoise_e = 10;
+
 std::string file_name(int number) {
   const std::string digits = std::to_string(number);
   return std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits + ".png";
@@ -27,8 +29,16 @@ std::uint8_t grey_value(double luminance, double white, double range_db) {
   return static_cast<std::uint8_t>(std::lround(255 * std::pow(std::min(luminance / white, 1.0), kGamma)));
 }
 
+double with_sensor_noise(double luminance, double white, double full_well_e, Random& random) {
+  if (!(full_well_e > 0)) return luminance;
+  const double electrons = full_well_e * std::min(luminance / white, 1.0);
+  const double sigma_e = std::sqrt(electrons + kReadNoise_e * kReadNoise_e);
+  return luminance + white / full_well_e * sigma_e * random.normal();
+}
+
 Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, const std::vector<float>& gain,
-                                          ImageSize size, const FramesConfig& config, TimeNs end) {
+                                          ImageSize size, const FramesConfig& config, TimeNs end,
+                                          std::uint64_t seed) {
   if (config.rate_hz > 0) {
     if (config.exposure_ms * 1e-3 * config.rate_hz > 1)
       return Error{"frames.exposure_ms",
@@ -36,7 +46,7 @@ Expected<FrameCamera> FrameCamera::create(const NewFolder& folder, const std::ve
                    "shorten the exposure or lower frames.rate_hz"};
     if (Status made = folder.make_folder("frames"); !made) return made.error();
   }
-  return FrameCamera(folder, gain, size, config, end);
+  return FrameCamera(folder, gain, size, config, end, seed);
 }
 
 std::vector<Exposure*> FrameCamera::exposures(TimeNs t0, TimeNs t1) {
@@ -57,22 +67,30 @@ std::vector<Exposure*> FrameCamera::exposures(TimeNs t0, TimeNs t1) {
   return out;
 }
 
+std::vector<std::uint8_t> FrameCamera::read_out(const Exposure& exposure) const {
+  const double length_s = to_seconds(exposure.close - exposure.open);
+  Random random(seed_, static_cast<std::uint64_t>(exposure.open));
+  std::vector<std::uint8_t> grey(exposure.sum.size());
+  for (std::size_t i = 0; i < grey.size(); ++i)
+    grey[i] = grey_value(
+        with_sensor_noise(gain_[i] * exposure.sum[i] / length_s, white_, config_.full_well_e, random), white_,
+        config_.range_db);
+  return grey;
+}
+
 Status FrameCamera::write_finished(TimeNs t) {
   while (!open_.empty() && open_.front().close <= t) {
     const Exposure& exposure = open_.front();
-    const double length_s = to_seconds(exposure.close - exposure.open);
     if (!(white_ > 0)) {
       constexpr double kWhiteOverMedian = 6;
       std::vector<float> sorted = exposure.sum;
       const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
       std::nth_element(sorted.begin(), middle, sorted.end());
-      white_ = std::max(1e-6, kWhiteOverMedian * *middle / length_s);
+      white_ = std::max(1e-6, kWhiteOverMedian * *middle / to_seconds(exposure.close - exposure.open));
     }
-    std::vector<std::uint8_t> grey(exposure.sum.size());
-    for (std::size_t i = 0; i < grey.size(); ++i)
-      grey[i] = grey_value(gain_[i] * exposure.sum[i] / length_s, white_, config_.range_db);
     const std::string name = file_name(written_++);
-    if (Status done = write_png_grey8(folder_->path("frames/" + name), size_.width, size_.height, grey);
+    if (Status done =
+            write_png_grey8(folder_->path("frames/" + name), size_.width, size_.height, read_out(exposure));
         !done)
       return done;
     stamps_ +=
@@ -121,6 +139,9 @@ void describe(ConfigTable& table, FramesConfig& c) {
   table.add("white_cd_m2", c.white_cd_m2, "cd/m^2",
             "luminance of white; 0: six times the median of the first frame", {0, 1e9});
   table.add("range_db", c.range_db, "dB", "dynamic range between black and white", {10, 140});
+  table.add("full_well_e", c.full_well_e, "",
+            "electrons at white: shot and read noise; fewer where gain makes up for light; 0: no noise",
+            {0, 1e7});
 }
 
 void describe(ConfigTable& table, DepthConfig& c) {

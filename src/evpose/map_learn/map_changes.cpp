@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <unordered_map>
 
 #include "evpose/map/contour_segments.h"
@@ -178,6 +179,10 @@ MapChanges DateComparison::run() {
     if (static_cast<double>(known) < kPaired * static_cast<double>(piece.size()))
       out.changes.push_back(described(after_, piece, Change::added));
   }
+  // A map file holds the points in another order than they were learnt in.
+  std::ranges::sort(out.changes, {}, [](const ContourChange& c) {
+    return std::tuple(c.change, c.middle.x(), c.middle.y(), c.middle.z());
+  });
   return out;
 }
 

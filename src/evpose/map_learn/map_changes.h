@@ -21,7 +21,7 @@ struct ContourChange {
 };
 
 struct MapChanges {
-  std::vector<ContourChange> changes;  ///< in the order of the old map, then of the new one
+  std::vector<ContourChange> changes;  ///< by kind, then by place
   double same_m = 0;                   ///< of the old map
 
   /// Of one kind.

@@ -8,8 +8,10 @@ DARK = ("frames.rate_hz=30", "frames.exposure_ms=25", "frames.full_well_e=500", 
 # Name: scenario, seconds, settings.
 FLIGHTS = {"hover": ("hover", 4, FRAMES),
            "rest, then flight": ("indoor_spiral", 5, (*FRAMES, "trajectory.rest_s=2.5")),
-           "dark": ("indoor_spiral", 3, DARK)}
-SEEDS = (101,)  # that no default was chosen on
+           "dark": ("indoor_spiral", 3, DARK),
+           "spiral": ("indoor_spiral", 3, FRAMES),
+           "aggressive": ("aggressive", 3, FRAMES)}
+SEEDS = (101, 102)  # that no default was chosen on
 USES = {"events alone": "off", "frames alone": "alone", "both": "fused"}
 HEAD = ["flight", "seed", *(f"{name}: ATE mm, ARE deg, NEES/6" for name in USES), "both to the better"]
 

@@ -35,8 +35,8 @@ inline Frame frame_of_line(const TestLine& line, double gamma, double row_time_s
       for (int i = 0; i < kInstants; ++i) {
         const double t_s = row_s + to_seconds(kFrameExposure) * ((i + 0.5) / kInstants - 0.5);
         for (int k = 0; k < kParts * kParts; ++k) {
-          const Eigen::Vector2d at(x + (k % kParts + 0.5) / kParts - 0.5,
-                                   y + (k / kParts + 0.5) / kParts - 0.5);
+          const int row = k / kParts, column = k % kParts;
+          const Eigen::Vector2d at(x + (column + 0.5) / kParts - 0.5, y + (row + 0.5) / kParts - 0.5);
           ahead += line.normal().dot(at) > line.distance_px + line.speed_px_s * t_s +
                                                0.5 * line.acceleration_px_s2 * t_s * t_s
                        ? 1

@@ -63,9 +63,9 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
 /// Reads and checks everything but the events.
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config);
 /// Gives the tracker the streams of the recording, IMU and frames ahead so that no event has to wait for
-/// them. `progress`, if any, is told the share of the recording, 0..1, and ends it by false.
+/// them. `told`, if any, hears the share of the recording, 0..1, and ends it by false.
 Status feed_recording(const Recording& recording, const RunConfig& config, Tracker& tracker,
-                      const std::function<bool(double)>& progress);
+                      const std::function<bool(double)>& told);
 /// What was given of the calibration and is known of it in the end; none: it counted as known.
 std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibration& found);
 /// What the run folder is told at the end; without times and memory. `found`: of the calibration.

@@ -152,12 +152,12 @@ bool fits(const std::string& bytes) {
 std::string encode_png(const RgbImage& image) {
   PaletteImage few = with_palette(image);
   const bool all = few.palette.empty();
-  const std::string bytes = encode({.width = image.width,
-                                    .height = image.height,
-                                    .color_type = all ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_PALETTE,
-                                    .channels = all ? 3 : 1,
-                                    .bytes = all ? image.rgb.data() : few.numbers.data(),
-                                    .palette = std::move(few.palette)});
+  std::string bytes = encode({.width = image.width,
+                              .height = image.height,
+                              .color_type = all ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_PALETTE,
+                              .channels = all ? 3 : 1,
+                              .bytes = all ? image.rgb.data() : few.numbers.data(),
+                              .palette = std::move(few.palette)});
   EVPOSE_CHECK(!bytes.empty());
   return bytes;
 }

@@ -83,12 +83,7 @@ bool EventRegistration::consistent() const {
 bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) const {
   const double steps = s.normal_side * contrast_.steps(s.segment);
   return sign * steps < 0 && std::abs(steps) >= ContrastMemory::kSureSteps && contrast_.known(s.segment) &&
-         direction_is_sure(s);
-}
-
-/// Outside the adaptive buffer zone (EV-Pose 5.1): which way the contour moves is known.
-bool EventRegistration::direction_is_sure(const ContourSample& s) const {
-  return std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
+         std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
 /// Of the events in the gate whose polarity is not excluded.
@@ -259,7 +254,7 @@ void EventRegistration::learn_contrast(const RegistrationProblem& p) {
     // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
     if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
       contrast_.sweep(s.segment, 2 * kHalfLength_px * std::abs(s.speed_px_s) * swept_s);
-    if (sums_[i].gate_all > 0 && direction_is_sure(s))
+    if (sums_[i].gate_all > 0)
       contrast_.count_in_gate(s.segment, s.normal_side * sums_[i].gate_net, sums_[i].gate_all);
     if (sums_[i].net != 0) contrast_.count(s.segment, s.normal_side * sums_[i].net);
   }

@@ -111,7 +111,6 @@ class EventRegistration final : public Registration {
   void mark_other_motion(const RegistrationProblem& problem);
   std::uint32_t cluster_of(const ContourSample& sample) const;
   bool consistent() const;
-  bool direction_is_sure(const ContourSample& sample) const;
   bool polarity_is_wrong(const ContourSample& sample, int sign) const;
   bool owns_probe(std::size_t sample, float half_span_us) const;
 

@@ -9,7 +9,7 @@
 namespace evpose {
 namespace {
 
-constexpr double kContourPrior = 0.5;  // an event in the gate is of the contour; without polarities
+constexpr double kContourPrior = 0.5;  // an event in the gate is of the contour; where polarity does not tell
 // Samples stand at least 4 px apart along a contour: each answers for half of that to either side, and more
 // where samples are left out.
 constexpr double kHalfLength_px = 4;
@@ -86,9 +86,9 @@ bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) cons
          std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
-/// Of the events in the gate whose polarity is not excluded.
+/// Share of the contour's among the events in its gate whose polarity is not excluded.
 double EventRegistration::contour_share(const ContourSample& s) const {
-  return config_.polarity ? contrast_.contour_share(s.segment) : kContourPrior;
+  return config_.polarity_tells_clutter ? contrast_.contour_share(s.segment) : kContourPrior;
 }
 
 EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
@@ -293,7 +293,7 @@ void EventRegistration::sum_clusters(const RegistrationProblem& p) {
     if (c.weight == 0 && config_.ego_motion_test) c.trust = flow_.trust(number);
     c.weight += sums_[i].weight;
     const double share = contour_share(p.samples[i]), clutter = (1 - share) / share;
-    if (config_.polarity) c.clutter += sums_[i].weight * clutter * clutter;
+    if (config_.polarity_tells_clutter) c.clutter += sums_[i].weight * clutter * clutter;
     c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
   }
 }

@@ -31,9 +31,10 @@ struct EventRegistrationConfig {
   bool ego_motion_test = false;      ///< mistrust cells whose events move otherwise (EV-Pose 5.3)
   double contrast_threshold = 0.25;  ///< of the camera, in log luminance
 
-  // Not for users: the relocalizer's stages differ in these.
+  // Not for users: the relocalizer's stages, or trackers without an IMU, differ in these.
   double contrast_band_px = 1.5;           ///< events so near teach the contrast
   bool gate_truncation_correction = true;  ///< take off the information that the gate hides
+  bool polarity_tells_clutter = false;     ///< needs the direction of motion from an IMU
   bool judge_contours = false;  ///< some may be wrong: those that events do not gather at lose weight
 };
 void describe(ConfigTable& table, EventRegistrationConfig& config);

@@ -188,6 +188,7 @@ TEST_F(EventRegistrationLaws, UniformClutterPullsNowhere) {
 }
 
 TEST_F(EventRegistrationLaws, AnEdgeAmongTextureCountsForLess) {
+  config_.polarity_tells_clutter = true;
   for (const int texture : {0, 1, 3}) {  // events of each polarity for every one of the edge
     samples_.clear(), events_.clear();
     add_line({100, 20}, {1, 0}, 500, 40);

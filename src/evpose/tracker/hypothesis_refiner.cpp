@@ -35,7 +35,7 @@ VisibleSetConfig points_to_refine(VisibleSetConfig config) {
 EventRegistrationConfig under_gate(EventRegistrationConfig config, double gate_px) {
   config.gate_px = gate_px;
   config.contrast_band_px = kContrastReach_px;
-  config.polarity = config.gate_truncation_correction = false;
+  config.polarity = config.polarity_tells_clutter = config.gate_truncation_correction = false;
   return config;
 }
 

@@ -54,7 +54,8 @@ EventRegistrationConfig under_gate(EventRegistrationConfig config, double gate_p
   config.gate_px = gate_px;
   config.event_sigma_px = std::max(config.event_sigma_px, kScatterOfGate * gate_px);
   config.contrast_band_px = kContrastReach_px;
-  config.polarity = config.gate_truncation_correction = config.ego_motion_test = false;
+  config.polarity = config.polarity_tells_clutter = config.gate_truncation_correction = false;
+  config.ego_motion_test = false;
   return config;
 }
 

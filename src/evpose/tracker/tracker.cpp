@@ -48,6 +48,8 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   TrackerConfig resolved_config = config;
   resolved_config.fusion = *fusion;
   choose_states(setup, resolved_config.fusion);
+  EventRegistrationConfig& registration = resolved_config.event_registration;
+  registration.polarity_tells_clutter = registration.polarity && setup.motion == MotionModel::imu;
   TrackerSetup own = setup;
   std::shared_ptr<AdjustedCamera> adjusted;
   if (resolved_config.fusion.calibration.intrinsics) {

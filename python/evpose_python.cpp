@@ -48,6 +48,7 @@ class PyTracker {
     setup.camera = value_of(make_camera(*chosen.intrinsics));
     setup.intrinsics = chosen.intrinsics;
     setup.calibration_sigma = chosen.sigma;
+    setup.trail_filter = chosen.trail_filter;
     setup.T_body_cam = chosen.T_cam_imu.value_or(Pose{}).inverse();
     has_imu_ = chosen.T_cam_imu.has_value();
     setup.motion = has_imu_ ? MotionModel::imu : MotionModel::constant_velocity;

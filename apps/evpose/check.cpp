@@ -15,6 +15,7 @@
 #include "evpose/io/recording/dataset_layouts.h"
 #include "evpose/io/recording/event_survey.h"
 #include "evpose/io/recording/imu_survey.h"
+#include "evpose/io/recording/trail_survey.h"
 #include "evpose/io/recording/turn_of_events.h"
 #include "evpose/run/progress.h"
 #include "info_parts.h"
@@ -68,10 +69,16 @@ Expected<std::vector<ImuSample>> read_imu(const Recording& r) {
   }
 }
 
-Expected<EventSummary> survey_events(const Recording& r) {
+struct SurveyedEvents {
+  EventSummary summary;
+  std::optional<double> filtered_gap_s;  ///< TrailSurvey's
+};
+
+Expected<SurveyedEvents> survey_events(const Recording& r) {
   auto reader = open_events(r);
   if (!reader) return reader.error();
   EventSurvey survey;
+  TrailSurvey trails(r.camera.size);
   EventPacket packet;
   Progress progress("reading events");
   while (true) {
@@ -79,11 +86,12 @@ Expected<EventSummary> survey_events(const Recording& r) {
     if (!more) return more.error();
     if (!*more) break;
     survey.add(packet);
+    trails.add(packet);
     progress.at(to_seconds(packet.time(packet.events.back()) - r.first_ns) /
                 std::max(1e-9, to_seconds(r.last_ns - r.first_ns)));
   }
   progress.done();
-  return survey.finish();
+  return SurveyedEvents{survey.finish(), trails.filtered_gap_s()};
 }
 
 /// How an IMU of that kind of file is made faster.
@@ -119,6 +127,17 @@ std::string joining_words(const Recording& r, const ClockOffset& found) {
               "} in recording.yaml: then events come when the IMU turns (correlation ",
               fixed(found.correlation, 2),
               "); good to 10 ms: state timeshift_sigma: 0.01 in the calibration");
+}
+
+/// A filter on the sensor moves events by up to half a pixel: the tracker has to know of it.
+void check_trail_filter(Checklist& list, const Recording& r, const std::optional<double>& gap_s) {
+  const bool stated = r.trail_filter.kind != TrailFilterKind::none;
+  if (!gap_s || stated) return;
+  list.problem("trail filter", {r.events_path,
+                                text("no pixel gives two successive events of one polarity within ",
+                                     1e3 * *gap_s, " ms: a trail filter was on, and poses will be off"),
+                                text("state trail_filter (first or second) and trail_filter_gap, at least ",
+                                     *gap_s, " s, in the calibration; or turn it off and record again")});
 }
 
 /// Streams on one clock, as far as is known: the events without IMU.
@@ -190,9 +209,11 @@ int check(const TrackRequest& request) {
 void check_clocks(Checklist& list, const CheckedRecording& data) {
   const auto events = survey_events(data.recording);
   if (!events) return list.problem("events", events.error());
-  check_events(list, data.recording, *events);
+  const EventSummary& summary = events->summary;
+  check_events(list, data.recording, summary);
+  check_trail_filter(list, data.recording, events->filtered_gap_s);
   if (data.imu.empty()) return;
-  const auto offset = find_clock_offset(*events, data.imu);
+  const auto offset = find_clock_offset(summary, data.imu);
   if (data.recording.clocks_apart) {
     Error apart = *data.recording.clocks_apart;
     if (offset) apart.fix = joining_words(data.recording, *offset);
@@ -206,7 +227,7 @@ void check_clocks(Checklist& list, const CheckedRecording& data) {
                                  fixed(offset->as_read, 2), "), but would on another clock"),
                             joining_words(data.recording, *offset)});
   else
-    check_common_time(list, data, *events, offset);
+    check_common_time(list, data, summary, offset);
 }
 
 void check_imu(Checklist& list, const CheckedRecording& data) {

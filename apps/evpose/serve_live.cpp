@@ -46,6 +46,7 @@ Expected<TrackJob> prepare_source(const ServeRequest& request, const RunConfig& 
   recording.folder = recording.name = track.recording;
   recording.camera = *chosen->intrinsics;
   recording.calibration_sigma = chosen->sigma;
+  recording.trail_filter = chosen->trail_filter;
   recording.calibration_path = track.calibration;
   recording.has_imu = chosen->T_cam_imu.has_value() && (!is_metavision_address(track.recording) ||
                                                         metavision_address_has_imu(track.recording));

@@ -16,8 +16,10 @@ constexpr double kSeedSteps = 1;      // of the threshold, that a map's sign sta
 
 }  // namespace
 
-ContrastMemory::ContrastMemory(std::uint32_t segments, double threshold)
-    : delays_(threshold), segments_(segments) {}
+ContrastMemory::ContrastMemory(std::uint32_t segments, double threshold, const TrailFilterSetting& filter)
+    : delays_(threshold), segments_(segments) {
+  if (filter.kind != TrailFilterKind::none) filtered_delays_.emplace(filter, threshold);
+}
 
 void ContrastMemory::seed(std::uint32_t segment, int sign) {
   if (sign == 0) return;
@@ -67,9 +69,11 @@ double ContrastMemory::steps(std::uint32_t segment) const {
   return s.net / (s.swept_px2 + kDoubt_px2);
 }
 
-EdgeDelay ContrastMemory::edge_delay(std::uint32_t segment) const {
-  if (!measured(segment)) return {kUnknownDelay_px, kUnknownDelay_px};
-  return delays_(step_of_events(std::abs(steps(segment))));
+FilteredEdgeDelay::Value ContrastMemory::edge_delay(std::uint32_t segment, double speed_px_s) const {
+  const double events = measured(segment) ? std::abs(steps(segment)) : -1;
+  if (filtered_delays_) return (*filtered_delays_)(events, speed_px_s);
+  if (events < 0) return {{kUnknownDelay_px, kUnknownDelay_px}, 0};
+  return {delays_(step_of_events(events)), 0};
 }
 
 }  // namespace evpose

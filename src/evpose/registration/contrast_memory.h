@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "evpose/registration/edge_delay.h"
+#include "evpose/registration/filtered_edge_delay.h"
 
 namespace evpose {
 
@@ -14,8 +15,8 @@ namespace evpose {
 /// whatever texture lies around it. The sign predicts polarities, the size how late events come.
 class ContrastMemory {
  public:
-  /// `threshold`: of the camera, in log luminance.
-  ContrastMemory(std::uint32_t segments, double threshold);
+  /// `threshold`: of the camera, in log luminance; `filter`: of its sensor.
+  ContrastMemory(std::uint32_t segments, double threshold, const TrailFilterSetting& filter = {});
 
   /// What the map says of a step's sign, -1, 0 or +1 as steps(). It counts until events have told more.
   void seed(std::uint32_t segment, int sign);
@@ -46,8 +47,8 @@ class ContrastMemory {
   /// long as little is known.
   double contour_share(std::uint32_t segment) const;
 
-  /// Of the segment, by the step that events have told of.
-  EdgeDelay edge_delay(std::uint32_t segment) const;
+  /// Of the segment, by the step that events have told of, moving at so much in the image, >= 0.
+  FilteredEdgeDelay::Value edge_delay(std::uint32_t segment, double speed_px_s) const;
 
   static constexpr double kSureSteps = 0.3;         ///< contrast from which on a sign is relied on
   static constexpr double kUnknownDelay_px = 0.10;  ///< of contours that have hardly moved yet
@@ -61,6 +62,7 @@ class ContrastMemory {
     bool seeded = false;
   };
   EdgeDelayTable delays_;
+  std::optional<FilteredEdgeDelay> filtered_delays_;  ///< if the sensor has a trail filter
   std::vector<Segment> segments_;
 };
 

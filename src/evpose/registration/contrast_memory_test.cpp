@@ -8,7 +8,7 @@
 namespace evpose {
 namespace {
 
-constexpr double kThreshold = 0.25;
+constexpr double kThreshold = 0.25, kSpeed_px_s = 100;
 
 void show(ContrastMemory& memory, double steps, double area_px2) {
   for (int k = 0; k < static_cast<int>(area_px2 / 10); ++k) {
@@ -44,8 +44,9 @@ TEST(ContrastMemory, AMapsSignHoldsUntilEventsTellOtherwise) {
     EXPECT_FALSE(memory.known(1));
     EXPECT_GE(sign * memory.steps(0), ContrastMemory::kSureSteps);
     EXPECT_EQ(memory.map_contrast(0), -sign);
-    EXPECT_DOUBLE_EQ(memory.edge_delay(0).on_px + memory.edge_delay(0).off_px,
-                     memory.edge_delay(1).on_px + memory.edge_delay(1).off_px);
+    EXPECT_DOUBLE_EQ(
+        memory.edge_delay(0, kSpeed_px_s).delay.on_px + memory.edge_delay(0, kSpeed_px_s).delay.off_px,
+        memory.edge_delay(1, kSpeed_px_s).delay.on_px + memory.edge_delay(1, kSpeed_px_s).delay.off_px);
     show(memory, -sign, 200);
     EXPECT_EQ(memory.map_contrast(0), sign);
   }
@@ -78,9 +79,10 @@ TEST(ContrastMemory, WhatTextureAddsIsToldByTheWrongPolarity) {
 TEST(ContrastMemory, TheEdgeDelayIsThatOfTheStepWhoseEventsWereCounted) {
   for (const double step : {-3.0, 0.8, 2.0}) {
     ContrastMemory memory(1, kThreshold);
-    EXPECT_EQ(memory.edge_delay(0).on_px, ContrastMemory::kUnknownDelay_px);
+    EXPECT_EQ(memory.edge_delay(0, kSpeed_px_s).delay.on_px, ContrastMemory::kUnknownDelay_px);
     show(memory, std::copysign(expected_events(std::abs(step)), step), 590);
-    const EdgeDelay learnt = memory.edge_delay(0), expected = edge_delay(std::abs(step), kThreshold);
+    const EdgeDelay learnt = memory.edge_delay(0, kSpeed_px_s).delay,
+                    expected = edge_delay(std::abs(step), kThreshold);
     EXPECT_NEAR(learnt.on_px, expected.on_px, 0.01) << step;
     EXPECT_NEAR(learnt.off_px, expected.off_px, 0.01) << step;
   }

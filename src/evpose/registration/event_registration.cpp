@@ -62,7 +62,7 @@ EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConf
     : size_(size),
       config_(config),
       index_(size, kHalfLength_px, kAmbiguity_px),
-      contrast_(segments, config.contrast_threshold),
+      contrast_(segments, config.contrast_threshold, config.trail_filter),
       trust_(config.judge_contours ? segments : 0) {}
 
 double EventRegistration::Concentration::value() const {
@@ -91,11 +91,11 @@ double EventRegistration::contour_share(const ContourSample& s) const {
   return config_.polarity_tells_clutter ? contrast_.contour_share(s.segment) : kContourPrior;
 }
 
-EdgeDelay EventRegistration::edge_delay(const ContourSample& s) const {
-  if (!config_.edge_delay) return {0, 0};
-  const double fade = std::min(1.0, std::abs(s.speed_px_s) / kFullDelay_px_s);
-  const EdgeDelay full = contrast_.edge_delay(s.segment);
-  return {fade * full.on_px, fade * full.off_px};
+FilteredEdgeDelay::Value EventRegistration::edge_delay(const ContourSample& s) const {
+  if (!config_.edge_delay) return {};
+  const double speed = std::abs(s.speed_px_s), fade = std::min(1.0, speed / kFullDelay_px_s);
+  const auto [full, sigma_px] = contrast_.edge_delay(s.segment, speed);
+  return {{fade * full.on_px, fade * full.off_px}, sigma_px};
 }
 
 /// Half width of the gate, px.
@@ -111,9 +111,10 @@ EventRegistration::Line EventRegistration::line_of(const ContourSample& s, doubl
   const double share = contour_share(s);
   const double odds = share / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - share);
   const int forward = s.speed_px_s > 0 ? 1 : -1;
-  const EdgeDelay delay = edge_delay(s);
+  const auto [delay, delay_sigma_px] = edge_delay(s);
   return {static_cast<float>(forward * delay.on_px),
           static_cast<float>(forward * delay.off_px),
+          static_cast<float>(delay_sigma_px),
           static_cast<float>(gate),
           static_cast<float>(-0.5 / variance),
           static_cast<float>(odds),
@@ -295,6 +296,7 @@ void EventRegistration::sum_clusters(const RegistrationProblem& p) {
     const double share = contour_share(p.samples[i]), clutter = (1 - share) / share;
     if (config_.polarity_tells_clutter) c.clutter += sums_[i].weight * clutter * clutter;
     c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
+    c.delay_variance += sums_[i].weight * lines_[i].delay_sigma * lines_[i].delay_sigma;
   }
 }
 
@@ -317,7 +319,7 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
     // Texture beside a contour moves along with it and draws the mean of its events.
     const double by_clutter = 1 + c.clutter / c.weight;
     const double shared = repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px * by_clutter +
-                                     c.map_variance / c.weight);
+                                     (c.map_variance + c.delay_variance) / c.weight);
     const double borne_out =
         config_.judge_contours ? trust_.trust(p.samples[i].segment, concentration_.value()) : 1;
     const double scale = borne_out * c.trust * own / (own + shared) / event_variance;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "evpose/camera/camera.h"
+#include "evpose/camera/trail_filter.h"
 #include "evpose/core/pose.h"
 #include "evpose/event/event_preprocessor.h"
 #include "evpose/registration/association_band.h"
@@ -35,6 +36,7 @@ struct EventRegistrationConfig {
   double contrast_band_px = 1.5;           ///< events so near teach the contrast
   bool gate_truncation_correction = true;  ///< take off the information that the gate hides
   bool polarity_tells_clutter = false;     ///< needs the direction of motion from an IMU
+  TrailFilterSetting trail_filter = {};    ///< of the sensor, as its calibration states it
   bool judge_contours = false;  ///< some may be wrong: those that events do not gather at lose weight
 };
 void describe(ConfigTable& table, EventRegistrationConfig& config);
@@ -67,12 +69,13 @@ class EventRegistration final : public Registration {
     if (config_.judge_contours) trust_.rearrange(before);
   }
   /// How far behind this contour its events are expected, px along its motion.
-  EdgeDelay edge_delay(const ContourSample& sample) const;
+  FilteredEdgeDelay::Value edge_delay(const ContourSample& sample) const;
 
  private:
   /// What an event needs to know of the sample that it belongs to.
   struct Line {
     float delay_on, delay_off;        ///< px, along the normal
+    float delay_sigma;                ///< px
     float gate;                       ///< px
     float exponent, odds;             ///< exp(exponent d^2) * odds: of the contour against clutter
     std::int8_t wrong_on, wrong_off;  ///< polarity excluded
@@ -94,7 +97,7 @@ class EventRegistration final : public Registration {
     void decay(double span_s);
   };
   struct Cluster {
-    double weight = 0, map_variance = 0, clutter = 0, trust = 1;
+    double weight = 0, map_variance = 0, delay_variance = 0, clutter = 0, trust = 1;
   };
   double gate_of(const ContourSample& sample) const;
   double contour_share(const ContourSample& sample) const;

@@ -196,6 +196,7 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
                map->map,
                recording.camera,
                recording.calibration_sigma,
+               recording.trail_filter,
                map->parts,
                start->T_map_body.p,
                recording.frame_camera};
@@ -234,6 +235,7 @@ std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibra
   CalibratedCamera& given = out.given;
   given.name = "cam0";
   given.intrinsics = recording.camera;
+  given.trail_filter = recording.trail_filter;
   given.has_timeshift = recording.has_imu;
   given.timeshift_cam_imu_s = recording.timeshift_cam_imu_s;
   if (recording.has_imu) given.T_cam_imu = recording.T_cam_body;

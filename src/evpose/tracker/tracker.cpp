@@ -50,6 +50,7 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   choose_states(setup, resolved_config.fusion);
   EventRegistrationConfig& registration = resolved_config.event_registration;
   registration.polarity_tells_clutter = registration.polarity && setup.motion == MotionModel::imu;
+  registration.trail_filter = setup.trail_filter;
   TrackerSetup own = setup;
   std::shared_ptr<AdjustedCamera> adjusted;
   if (resolved_config.fusion.calibration.intrinsics) {

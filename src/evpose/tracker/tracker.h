@@ -9,6 +9,7 @@
 
 #include "evpose/camera/adjusted_camera.h"
 #include "evpose/camera/calibration_sigma.h"
+#include "evpose/camera/trail_filter.h"
 #include "evpose/core/error.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/contour_selection.h"
@@ -37,6 +38,7 @@ struct TrackerSetup {
   /// How wrong `camera` and T_body_cam and the time of the IMU may be; none: they are known. Without an IMU,
   /// so are intrinsics of which it states nothing.
   std::optional<CalibrationSigma> calibration_sigma = {};
+  TrailFilterSetting trail_filter = {};  ///< of the sensor
   /// Where the rest of the map is had from; `map` is then the part around `map_middle`, near the start, out
   /// to part_radius_m(). None: `map` is all of it.
   MapParts map_parts = {};

@@ -78,7 +78,7 @@ LookCounter::Gathered& LookCounter::add_sample(const ContourSample& s, std::int6
   const int forward = s.speed_px_s > 0 ? 1 : -1, motion_side = forward * s.normal_side;
   Gathered& g = gathered_[{s.segment, block, motion_side}];
   ContourLook& look = g.look;
-  const auto delay = registration.edge_delay(s);
+  const EdgeDelay delay = registration.edge_delay(s).delay;
   look.segment = s.segment;
   look.block = block;
   look.motion_side = motion_side;

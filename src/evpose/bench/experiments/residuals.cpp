@@ -27,12 +27,17 @@ Expected<std::vector<TimedPose>> tracked_poses(const Streams& streams) {
   return out;
 }
 
+TrackerConfig with_sensor(TrackerConfig config, const TrackerSetup& setup) {
+  config.event_registration.trail_filter = setup.trail_filter;
+  return config;
+}
+
 /// Holds the events against the contours as seen from given poses, one update after the other.
 class PosedRegistration {
  public:
   PosedRegistration(const TrackJob& job, const std::vector<TimedPose>& poses)
       : job_(job),
-        config_(job.config.tracker),
+        config_(with_sensor(job.config.tracker, job.setup)),
         poses_(poses),
         index_(*job.map),
         segments_(cut_into_segments(*job.map)),
@@ -76,7 +81,7 @@ class PosedRegistration {
   }
 
   const TrackJob& job_;
-  const TrackerConfig& config_;
+  const TrackerConfig config_;
   const std::vector<TimedPose>& poses_;
   ContourIndex index_;
   ContourSegments segments_;

@@ -7,6 +7,7 @@
 
 #include "evpose/camera/calibration_sigma.h"
 #include "evpose/camera/camera.h"
+#include "evpose/camera/trail_filter.h"
 #include "evpose/core/error.h"
 #include "evpose/core/pose.h"
 #include "evpose/imu/imu.h"
@@ -25,6 +26,7 @@ struct CalibratedCamera {
   bool has_timeshift = false;            ///< the file says something about it
   double timeshift_cam_imu_s = 0;        ///< t_imu = t_cam + timeshift
   CalibrationSigma sigma;                ///< as far as the file states it
+  TrailFilterSetting trail_filter;       ///< of the sensor, likewise
   int model_line = 1, numbers_line = 1;  ///< where model and intrinsics stand in the file
 };
 

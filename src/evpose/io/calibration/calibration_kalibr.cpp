@@ -10,6 +10,7 @@ namespace evpose {
 namespace {
 
 constexpr double kLongestShift_s = 1e6, kDegree = M_PI / 180;
+constexpr double kLongestGap_s = 10;
 
 /// Kalibr's camera models: how many of their numbers stand before fu, fv, pu, pv.
 std::size_t leading_numbers(const std::string& model) {
@@ -156,6 +157,29 @@ Status read_stated_sigma(const YamlDocument& document, const YamlNode& node, Cal
   return read_correlation(document, node, out);
 }
 
+/// What the sensor drops of the events, likewise.
+Status read_trail_filter(const YamlDocument& document, const YamlNode& node, CalibratedCamera& out) {
+  const YamlNode* kind = node.find("trail_filter");
+  if (kind == nullptr) return {};
+  const auto word = document.string(*kind, "trail_filter");
+  if (!word) return word.error();
+  const auto known = std::find_if(kTrailFilters.begin(), kTrailFilters.end(),
+                                  [&](const auto& filter) { return filter.first == *word; });
+  if (known == kTrailFilters.end())
+    return document.error(*kind, "trail_filter '" + *word + "' is not known",
+                          "give none, first, second or all_but_first");
+  out.trail_filter.kind = known->second;
+  if (known->second == TrailFilterKind::none) return {};
+  const auto gap = required_number(document, node, "trail_filter_gap");
+  if (!gap) return gap.error();
+  if (!(*gap > 0 && *gap <= kLongestGap_s))
+    return document.error(*node.find("trail_filter_gap"),
+                          text("trail_filter_gap: ", *gap, " s is out of range"),
+                          text("give seconds, above 0 and up to ", kLongestGap_s));
+  out.trail_filter.longest_gap_s = *gap;
+  return {};
+}
+
 /// Where a camera sits, by its own entries or through the camera before it.
 Status read_placement(const YamlDocument& document, const YamlNode& node, const CalibratedCamera* before,
                       CalibratedCamera& out) {
@@ -219,6 +243,7 @@ Expected<CalibrationFile> read_kalibr_chain(const YamlDocument& document) {
     if (auto status = read_model(document, *node, camera); !status) return status.error();
     if (auto status = read_shift(document, *node, camera); !status) return status.error();
     if (auto status = read_stated_sigma(document, *node, camera); !status) return status.error();
+    if (auto status = read_trail_filter(document, *node, camera); !status) return status.error();
     if (i == 0) camera.T_cam_cam0 = Pose{};
     const CalibratedCamera* before = i == 0 ? nullptr : &out.cameras.back();
     if (auto status = read_placement(document, *node, before, camera); !status) return status.error();

@@ -54,6 +54,9 @@ Status write_kalibr_camera(const std::string& path, const CalibratedCamera& came
     for (const auto& row : sigma.correlation->rowwise())
       out += "  - " + list({row.begin(), row.end()}) + "\n";
   }
+  if (const TrailFilterSetting& filter = camera.trail_filter; filter.kind != TrailFilterKind::none)
+    out += text("  trail_filter: ", trail_filter_word(filter.kind),
+                "\n  trail_filter_gap: ", exact(filter.longest_gap_s), "\n");
   return write_text_file(path, out);
 }
 

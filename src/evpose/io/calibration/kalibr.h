@@ -14,7 +14,8 @@ namespace evpose {
 /// As cam0. Without T_cam_imu neither it nor the shift is written. A camera without intrinsics is a fault of
 /// ours. What is known of the errors stands beside Kalibr's keys: intrinsics_sigma (px), distortion_sigma,
 /// T_cam_imu_sigma (deg about, then m along each axis of the IMU), timeshift_sigma (s), and
-/// calibration_correlation of all these in this order, row by row.
+/// calibration_correlation of all these in this order, row by row; so do the sensor's trail_filter (by its
+/// word in kTrailFilters) and trail_filter_gap (s).
 Status write_kalibr_camera(const std::string& path, const CalibratedCamera& camera);
 
 /// The noise of any calibration file that has one. Errors name the line: missing or non-positive values, a

@@ -123,6 +123,29 @@ TEST(Kalibr, SigmasThatAreNoneNameTheLine) {
   }
 }
 
+TEST(Kalibr, TheSensorsTrailFilterIsReadAsWritten) {
+  const TemporaryFolder folder;
+  auto camera = read_camera(folder.file("plain.yaml", kCamera));
+  ASSERT_TRUE(camera.ok());
+  EXPECT_EQ(camera->trail_filter.kind, TrailFilterKind::none);
+  for (const auto& [word, kind] : kTrailFilters) {
+    EXPECT_EQ(trail_filter_word(kind), word);
+    camera->trail_filter = {kind, 0.003};
+    ASSERT_TRUE(write_kalibr_camera(folder / "all.yaml", *camera).ok());
+    const auto again = read_camera(folder / "all.yaml");
+    ASSERT_TRUE(again.ok()) << error_line(again);
+    EXPECT_EQ(again->trail_filter.kind, kind);
+    EXPECT_EQ(again->trail_filter.longest_gap_s,
+              kind == TrailFilterKind::none ? TrailFilterSetting().longest_gap_s : 0.003);
+  }
+  const auto line = [&](const std::string& lines) {
+    return error_line(read_camera(folder.file("c.yaml", kCamera + lines)));
+  };
+  EXPECT_TRUE(says(line("  trail_filter: last\n"), {"c.yaml:13", "'last' is not known", "all_but_first"}));
+  EXPECT_TRUE(says(line("  trail_filter: first\n"), {"trail_filter_gap"}));
+  EXPECT_TRUE(says(line("  trail_filter: first\n  trail_filter_gap: -1\n"), {"c.yaml:14", "-1 s"}));
+}
+
 TEST(Kalibr, ExtrinsicsRunAlongTheChain) {
   const TemporaryFolder folder;
   const std::string second =

@@ -91,6 +91,7 @@ Status take_calibration(const FoundRecording& found, Recording& r) {
   if (!camera) return camera.error();
   r.camera = *camera->intrinsics;
   r.calibration_sigma = camera->sigma;
+  r.trail_filter = camera->trail_filter;
   r.T_cam_body = camera->T_cam_imu.value_or(Pose{});
   r.timeshift_cam_imu_s = camera->timeshift_cam_imu_s;
   if (!r.has_imu) return {};

@@ -8,6 +8,7 @@
 
 #include "evpose/camera/calibration_sigma.h"
 #include "evpose/camera/camera.h"
+#include "evpose/camera/trail_filter.h"
 #include "evpose/core/error.h"
 #include "evpose/core/pose.h"
 #include "evpose/imu/imu.h"
@@ -34,6 +35,7 @@ struct Recording {
 
   CameraIntrinsics camera;
   CalibrationSigma calibration_sigma;  ///< of camera, T_cam_body and the IMU's time
+  TrailFilterSetting trail_filter;     ///< of the sensor, as the calibration states it
   double timeshift_cam_imu_s = 0;      ///< t_imu = t_cam + timeshift; the events' times already have it
   Pose T_cam_body;  ///< identity when there is no IMU and the calibration has no extrinsics: body = camera
   bool has_imu = false;

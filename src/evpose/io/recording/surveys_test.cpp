@@ -6,6 +6,7 @@
 
 #include "evpose/io/recording/event_survey.h"
 #include "evpose/io/recording/imu_survey.h"
+#include "evpose/io/recording/trail_survey.h"
 
 namespace evpose {
 namespace {
@@ -20,6 +21,47 @@ EventSummary survey(const std::vector<std::pair<TimeNs, std::pair<int, int>>>& e
     survey.add(packet);
   }
   return survey.finish();
+}
+
+/// Trails of one to five events, 1.5 ms apart, of alternating polarity, 1.6 ms apart; `kept`: of each.
+std::optional<double> gap_of_trails(int first_kept, int last_kept) {
+  std::mt19937 random(3);
+  TrailSurvey survey({8, 8});
+  for (int pixel = 0; pixel < 64; ++pixel) {
+    TimeNs t = kNsPerMs;
+    for (int trail = 0; trail < 200; ++trail) {
+      const int length = 1 + static_cast<int>(random() % 5);
+      for (int i = 1; i <= length; ++i, t += 3 * kNsPerMs / 2) {
+        if (i < first_kept || i > last_kept) continue;
+        EventPacket packet;
+        packet.base = t;
+        packet.events.push_back(make_event(0, pixel % 8, pixel / 8, trail % 2 == 0));
+        survey.add(packet);
+      }
+      t += kNsPerMs / 10;
+    }
+  }
+  return survey.filtered_gap_s();
+}
+
+TEST(TrailSurvey, TellsAStreamThatKeepsOneEventOfEachTrail) {
+  EXPECT_FALSE(gap_of_trails(1, 5).has_value());
+  EXPECT_FALSE(gap_of_trails(2, 5).has_value());
+  for (const int kept : {1, 2}) {
+    const auto gap_s = gap_of_trails(kept, kept);
+    ASSERT_TRUE(gap_s.has_value()) << kept;
+    EXPECT_GE(*gap_s, 0.002);
+  }
+}
+
+TEST(TrailSurvey, SaysNothingOfFewEvents) {
+  TrailSurvey survey({4, 4});
+  EXPECT_FALSE(survey.filtered_gap_s().has_value());
+  EventPacket packet;
+  packet.events.push_back(make_event(0, 1, 1, true));
+  packet.events.push_back(make_event(9, 60'000, 60'000, true));
+  survey.add(packet);
+  EXPECT_FALSE(survey.filtered_gap_s().has_value());
 }
 
 TEST(EventSurvey, CountsAreThoseOfTheStream) {

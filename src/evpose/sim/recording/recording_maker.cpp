@@ -184,6 +184,7 @@ Status RecordingMaker::write_motion_and_calibration(const Trajectory& trajectory
 
 Status RecordingMaker::write_calibration(CalibratedCamera truth) const {
   truth.sigma = CalibrationSigma::known(*truth.intrinsics);
+  truth.trail_filter = {scenario_.read_out.trail, 1e-3 * scenario_.read_out.trail_ms};
   const std::string handed_over = folder_.path("camchain-imucam.yaml");
   const CalibrationErrors errors =
       draw_calibration_errors(scenario_.handed_over, static_cast<std::uint64_t>(scenario_.seed));

@@ -5,17 +5,10 @@
 #include <vector>
 
 #include "evpose/camera/camera.h"
+#include "evpose/camera/trail_filter.h"
 #include "evpose/sim/sensors/sim_event.h"
 
 namespace evpose::sim {
-
-/// What is kept of a trail: events of one polarity at a pixel, each soon after the one before.
-enum class TrailFilterKind : std::uint8_t {
-  none,          ///< all
-  first,         ///< the first (vendor's TRAIL)
-  second,        ///< the second (STC_CUT_TRAIL)
-  all_but_first  ///< the second and what follows (STC_KEEP_TRAIL)
-};
 
 /// Trail filter on the sensor: drops by the place of an event in its trail.
 class TrailFilter {

@@ -25,10 +25,7 @@ void describe(ConfigTable& table, ReadOutConfig& c) {
   table.add("scan_hold", c.scan_hold,
             "scan: all columns are sampled at the same moment, else one after the other");
   table.add("trail", c.trail,
-            ConfigTable::Choices<TrailFilterKind>{{"none", TrailFilterKind::none},
-                                                  {"first", TrailFilterKind::first},
-                                                  {"second", TrailFilterKind::second},
-                                                  {"all_but_first", TrailFilterKind::all_but_first}},
+            ConfigTable::Choices<TrailFilterKind>(kTrailFilters.begin(), kTrailFilters.end()),
             "trail filter: what is kept of a pixel's successive events of one polarity");
   table.add("trail_ms", c.trail_ms, "ms", "longest time between the events of a trail", {0.1, 1000});
   table.add("rate_control_mev_s", c.rate_control_mev_s, "Mev/s",

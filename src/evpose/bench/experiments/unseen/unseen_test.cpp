@@ -120,7 +120,7 @@ TEST(UnseenDraw, MapsFiltersAndCalibrationsHaveTheirFaults) {
     drift += s.lidar.registration_drift_mm_per_10m > 0 ? 1 : 0;
     missing += s.lidar.missing_parts > 0 ? 1 : 0;
     moved += s.lidar.moved_furniture > 0 ? 1 : 0;
-    trails += s.read_out.trail != sim::TrailFilterKind::none ? 1 : 0;
+    trails += s.read_out.trail != TrailFilterKind::none ? 1 : 0;
     presets += s.events.preset != sim::EventSensorPreset::typical ? 1 : 0;
     mirrors += s.world.mirror > 0 ? 1 : 0;
     EXPECT_TRUE(s.lidar.on);

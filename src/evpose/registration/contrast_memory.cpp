@@ -10,7 +10,9 @@ namespace {
 
 constexpr double kDoubt_px2 = 20;     // of a step of none, or of the map's sign, before anything is seen
 constexpr float kGateMemory = 100;    // events in the gates until those before count half
-constexpr double kGateDoubt = 2.5;    // so many of the contour, and as much clutter, before any have come
+constexpr float kGateFlow_px = 1000;  // likewise, way of the image
+// So many of the contour, and as much clutter, on such a way before any have come.
+constexpr double kGateDoubt = 10, kGateDoubt_px = 4;
 constexpr double kLeastShare = 0.02;  // of the contour, and of clutter
 constexpr double kSeedSteps = 1;      // of the threshold, that a map's sign stands for
 
@@ -46,16 +48,21 @@ void ContrastMemory::count(std::uint32_t segment, int net) {
   segments_[segment].net += static_cast<float>(net);
 }
 
-void ContrastMemory::count_in_gate(std::uint32_t segment, int net, int all) {
+void ContrastMemory::count_in_gate(std::uint32_t segment, int net, int all, double way_px, double flow_px) {
   Segment& s = segments_[segment];
   s.gate_net += static_cast<float>(net), s.gate_all += static_cast<float>(all);
-  if (s.gate_all > kGateMemory) s.gate_net *= 0.5F, s.gate_all *= 0.5F;
+  s.way_px += static_cast<float>(way_px), s.flow_px += static_cast<float>(flow_px);
+  if (s.gate_all > kGateMemory || s.flow_px > kGateFlow_px)
+    s.gate_net *= 0.5F, s.gate_all *= 0.5F, s.way_px *= 0.5F, s.flow_px *= 0.5F;
 }
 
-double ContrastMemory::contour_share(std::uint32_t segment) const {
+double ContrastMemory::contour_share(std::uint32_t segment, double speed_px_s, double flow_px_s) const {
   const Segment& s = segments_[segment];
-  const double own = std::abs(s.gate_net), right = 0.5 * (s.gate_all + own);
-  return std::clamp((own + kGateDoubt) / (right + 2 * kGateDoubt), kLeastShare, 1 - kLeastShare);
+  const double net = std::abs(s.gate_net), clutter = 0.5 * (s.gate_all - net);
+  const double own = (net + kGateDoubt) / (s.way_px + kGateDoubt_px) * speed_px_s,
+               other = (clutter + kGateDoubt) / (s.flow_px + kGateDoubt_px) * flow_px_s;
+  if (own + other <= 0) return 0.5;
+  return std::clamp(own / (own + other), kLeastShare, 1 - kLeastShare);
 }
 
 int ContrastMemory::map_contrast(std::uint32_t segment) const {

@@ -28,8 +28,9 @@ class ContrastMemory {
   void sweep(std::uint32_t segment, double area_px2);
   /// On less off events near the segment, as it would be if its normal pointed along its motion.
   void count(std::uint32_t segment, int net);
-  /// Events in the gates of the segment, of both polarities: on less off as count(), and all.
-  void count_in_gate(std::uint32_t segment, int net, int all);
+  /// Events in the gates of the segment, of both polarities: on less off as count(), and all; while the
+  /// contour moved so far across itself, and the image there in any direction.
+  void count_in_gate(std::uint32_t segment, int net, int all, double way_px, double flow_px);
 
   /// Steps of the threshold across the contour, positive if it is darker in front of it, where the map's
   /// normal points; near 0 as long as little is known.
@@ -42,10 +43,12 @@ class ContrastMemory {
   /// the map's normal points.
   int map_contrast(std::uint32_t segment) const;
 
-  /// Share of the contour's own among the events of its polarity in its gates. Texture beside it makes as
-  /// many of one polarity as of the other, so that as many are clutter as are of the wrong one. A half as
-  /// long as little is known.
-  double contour_share(std::uint32_t segment) const;
+  /// Share of the contour's own among the events of its polarity in its gates, while it moves across itself
+  /// at one speed and the image at another, both >= 0. Texture beside it makes as many of one polarity as of
+  /// the other, so that as many are clutter as are of the wrong one. Its own grow with the way across itself,
+  /// those of texture with the way of the image, however the contour lies. As many of one as of the other for
+  /// the same way as long as little is known.
+  double contour_share(std::uint32_t segment, double speed_px_s, double flow_px_s) const;
 
   /// Of the segment, by the step that events have told of, moving at so much in the image, >= 0.
   FilteredEdgeDelay::Value edge_delay(std::uint32_t segment, double speed_px_s) const;
@@ -58,7 +61,7 @@ class ContrastMemory {
   static constexpr double kLittle_px2 = 40;
   struct Segment {
     float net = 0, swept_px2 = 0;
-    float gate_net = 0, gate_all = 0;
+    float gate_net = 0, gate_all = 0, way_px = 0, flow_px = 0;
     bool seeded = false;
   };
   EdgeDelayTable delays_;

@@ -61,19 +61,38 @@ TEST(ContrastMemory, TextureOfBothSignsCancels) {
   EXPECT_LT(std::abs(memory.steps(0)), 0.02);
 }
 
-/// Of 100 events in the gates `own` are the step's, the others of texture, as many of either polarity.
+/// Of 100 events in the gates `own` are the step's, the others of texture, as many of either polarity, while
+/// the contour moves across itself by the given share of the image's motion.
+void show_gate(ContrastMemory& memory, int own, double across) {
+  for (int k = 0; k < 50; ++k) memory.count_in_gate(0, own, 100, 50 * across, 50);
+}
+
 TEST(ContrastMemory, WhatTextureAddsIsToldByTheWrongPolarity) {
   for (const int sign : {-1, 1})
     for (const int own : {0, 20, 50, 90}) {
       ContrastMemory memory(2, kThreshold);
-      EXPECT_DOUBLE_EQ(memory.contour_share(0), 0.5);
-      for (int k = 0; k < 50; ++k) memory.count_in_gate(0, sign * own, 100);
+      EXPECT_DOUBLE_EQ(memory.contour_share(0, kSpeed_px_s, kSpeed_px_s), 0.5);
+      show_gate(memory, sign * own, 1);
       const double right = own + 0.5 * (100 - own);
-      EXPECT_NEAR(memory.contour_share(0), own / right, 0.05) << own;
-      EXPECT_DOUBLE_EQ(memory.contour_share(1), 0.5);
-      for (int k = 0; k < 50; ++k) memory.count_in_gate(0, -sign * 50, 100);
-      EXPECT_NEAR(memory.contour_share(0), 50.0 / 75, 0.05) << own;
+      EXPECT_NEAR(memory.contour_share(0, kSpeed_px_s, kSpeed_px_s), own / right, 0.15) << own;
+      EXPECT_DOUBLE_EQ(memory.contour_share(1, kSpeed_px_s, kSpeed_px_s), 0.5);
     }
+}
+
+TEST(ContrastMemory, AContourThatSlidesAlongItselfMakesNoEvents) {
+  ContrastMemory memory(2, kThreshold);
+  show_gate(memory, 60, 0.5);
+  const auto odds = [&](std::uint32_t segment, double across) {
+    const double share = memory.contour_share(segment, across * kSpeed_px_s, kSpeed_px_s);
+    return share / (1 - share);
+  };
+  for (const std::uint32_t segment : {0U, 1U})
+    EXPECT_NEAR(odds(segment, 0.5) / odds(segment, 0.1), 5, 1e-6) << segment;
+  EXPECT_NEAR(odds(1, 1), 1, 1e-12);
+  EXPECT_LT(memory.contour_share(0, 0, kSpeed_px_s), 0.03);
+  EXPECT_DOUBLE_EQ(memory.contour_share(0, 0, 0), 0.5);
+  // Seen at half the image's motion, 60 of the contour beside 20 of texture: twice as many would be its own.
+  EXPECT_NEAR(memory.contour_share(0, 0.5 * kSpeed_px_s, kSpeed_px_s), 60.0 / 80, 0.1);
 }
 
 TEST(ContrastMemory, TheEdgeDelayIsThatOfTheStepWhoseEventsWereCounted) {

@@ -86,9 +86,20 @@ bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) cons
          std::abs(s.speed_px_s) >= config_.buffer_sigma * s.speed_sigma_px_s;
 }
 
+/// Speeds of a contour across itself and of the image there, as they may be where the velocity is unsure: a
+/// contour that is thought to stand still by mistake has to be able to say so.
+struct Speeds {
+  double across_px_s, flow_px_s;
+};
+Speeds possible_speeds(const ContourSample& s) {
+  return {std::hypot(s.speed_px_s, s.speed_sigma_px_s), std::hypot(s.flow_px_s, s.speed_sigma_px_s)};
+}
+
 /// Share of the contour's among the events in its gate whose polarity is not excluded.
 double EventRegistration::contour_share(const ContourSample& s) const {
-  return config_.polarity_tells_clutter ? contrast_.contour_share(s.segment) : kContourPrior;
+  if (!config_.polarity_tells_clutter) return kContourPrior;
+  const Speeds speeds = possible_speeds(s);
+  return contrast_.contour_share(s.segment, speeds.across_px_s, speeds.flow_px_s);
 }
 
 FilteredEdgeDelay::Value EventRegistration::edge_delay(const ContourSample& s) const {
@@ -255,8 +266,9 @@ void EventRegistration::learn_contrast(const RegistrationProblem& p) {
     // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
     if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
       contrast_.sweep(s.segment, 2 * kHalfLength_px * std::abs(s.speed_px_s) * swept_s);
-    if (sums_[i].gate_all > 0)
-      contrast_.count_in_gate(s.segment, s.normal_side * sums_[i].gate_net, sums_[i].gate_all);
+    const Speeds speeds = possible_speeds(s);
+    contrast_.count_in_gate(s.segment, s.normal_side * sums_[i].gate_net, sums_[i].gate_all,
+                            speeds.across_px_s * p.span_s, speeds.flow_px_s * p.span_s);
     if (sums_[i].net != 0) contrast_.count(s.segment, s.normal_side * sums_[i].net);
   }
 }

@@ -104,23 +104,52 @@ def make_faults(bench):
 
 
 DRAWS = 20  # of all errors of an ordinary calibration, for each recording
+CALIBRATION_FLIGHTS = {"hall, 10 s": "indoor_spiral", "landing, 10 s": "landing"}
+CALIBRATION_FLIGHT_S = 10
 
 
 def make_calibration(bench):
     only = ["--only", "room_720p"] if bench.quick else []
     data = bench.shared / "data/peer"
     printed = bench.once("calibration", lambda: bench.run("bench", "calibration", data, *only))
+    draws = ["--draws", 2 if bench.quick else DRAWS]
 
     def spoilt(name):
-        return bench.once(f"calibration-errors, {name}", lambda: bench.run("bench", "calibration-errors", data, "--only", name,
-                                                                           "--draws", 2 if bench.quick else DRAWS))
+        words = [data, "--only", name]
+        if name in CALIBRATION_FLIGHTS:
+            flight = bench.simulated(CALIBRATION_FLIGHTS[name], CALIBRATION_FLIGHT_S, ("camera.size=vga",))
+            words = ["--recording", flight.folder, "--map", flight.contours, "--occluders", flight.mesh]
+        text = bench.once(f"calibration-errors by second, {name}", lambda: bench.run("bench", "calibration-errors", *words, *draws))
+        return {heading: [{**row, "recording": name} for row in rows] for heading, rows in tables.read(text).items()}
 
-    names = ["room_720p"] if bench.quick else list(harness.PEER)
+    names = ["room_720p"] if bench.quick else [*harness.PEER, *CALIBRATION_FLIGHTS]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        rows = [row for text in pool.map(spoilt, names) for row in tables.read(text)[""]]
-    single = [list(row.values()) for row in rows if not row["given wrong"].startswith("draw")]
+        found = list(pool.map(spoilt, names))
+    rows = [row for one in found for row in one[""]]
+    seconds = [row for one in found for row in one["Told, by second of data"]]
+    single = [list(row.values()) for row in rows if not is_drawn(row)]
     return bench.write_page("calibration", {"errors": printed.splitlines(), "pose": tables.table(list(rows[0]), single),
-                                            "summary": calibration_summary(rows)})
+                                            "summary": calibration_summary(rows), "seconds": calibration_seconds(seconds)})
+
+
+def is_drawn(row):
+    return row["given wrong"].startswith("draw")
+
+
+def calibration_seconds(rows):
+    """Means over the drawn calibrations, and those over all recordings."""
+    names, seconds = (list(dict.fromkeys(row[column] for row in rows)) for column in ("recording", "second"))
+
+    def cell(own):
+        if not own:
+            return "-"
+        camera, nees = (sum(float(row[column]) for row in own) / len(own) for column in ("camera mm", "NEES/6"))
+        return f"{camera:.1f}, {nees:.2f}"
+
+    drawn = [row for row in rows if is_drawn(row)]
+    lines = [[f"{int(k)} to {int(k) + 1}", *(cell([row for row in drawn if row["second"] == k and name in (row["recording"], None)])
+                                             for name in [*names, None])] for k in seconds]
+    return tables.table(["second", *names, "all"], lines)
 
 
 def calibration_summary(rows):
@@ -129,7 +158,7 @@ def calibration_summary(rows):
     for recording in dict.fromkeys(row["recording"] for row in rows):
         own = [row for row in rows if row["recording"] == recording]
         true = next(row for row in own if row["given wrong"] == "nothing")
-        drawn = [row for row in own if row["given wrong"].startswith("draw")]
+        drawn = [row for row in own if is_drawn(row)]
 
         def column(name, drawn=drawn):
             return [float(row[name]) for row in drawn if re.fullmatch(r"[0-9.]+", row[name])]

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The pose with a calibration that is wrong by known amounts, as given and with its errors as states.
+#include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -79,10 +81,33 @@ Status spoil(const GivenWrong& wrong, Streams& streams) {
 }
 
 /// What the pose of the body is worth, and how far the camera is off on average.
-struct CalibratedRun {
+struct CalibratedPart {
   unseen::RunFigures body;
   double camera_mm = 0;
 };
+struct CalibratedRun {
+  CalibratedPart whole;
+  std::vector<CalibratedPart> by_second;  ///< of data, the first from when it is judged
+};
+
+/// A pose, and how far the camera is off with what is known of the calibration by then.
+struct CalibratedPose {
+  unseen::TrackedPose body;
+  double camera_mm;
+};
+
+CalibratedPart judged(const std::vector<CalibratedPose>& all, const std::vector<TimedPose>& truth,
+                      TimeNs from, TimeNs to) {
+  CalibratedPart out;
+  std::vector<unseen::TrackedPose> poses;
+  for (const CalibratedPose& p : all) {
+    if (p.body.pose.t < from || p.body.pose.t >= to) continue;
+    poses.push_back(p.body);
+    out.camera_mm += (p.camera_mm - out.camera_mm) / static_cast<double>(poses.size());
+  }
+  out.body = unseen::judge(poses, truth, from).figures;
+  return out;
+}
 
 /// `stated`: the tracker is told that the calibration is an ordinary one; else that it is known.
 Expected<CalibratedRun> tracked(const Streams& streams, const Pose& true_T_body_cam, bool stated) {
@@ -90,25 +115,24 @@ Expected<CalibratedRun> tracked(const Streams& streams, const Pose& true_T_body_
   if (stated) setup.calibration_sigma = CalibrationSigma{};
   auto tracker = Tracker::create(setup, streams.job.config.tracker, streams.job.start);
   if (!tracker) return tracker.error();
-  std::vector<unseen::TrackedPose> poses;
-  const TimeNs from = streams.job.start.t + kJudgedAfter;
-  CalibratedRun out;
-  int seen = 0;
+  std::vector<CalibratedPose> poses;
   (*tracker)->on_update([&](const Update& u) {
-    poses.push_back({{u.t, u.T_map_body}, u.covariance, u.health});
-    if (u.t < from) return;
     const Pose truth = true_pose(streams.job.truth, u.t);
     const Calibration found = (*tracker)->calibration();
     const Pose T_body_cam{found.turn * setup.T_body_cam.q, setup.T_body_cam.p + found.shift};
     const Eigen::Vector3d off = (u.T_map_body * T_body_cam).p - (truth * true_T_body_cam).p;
-    out.camera_mm += (1e3 * off.norm() - out.camera_mm) / ++seen;
+    poses.push_back({{{u.t, u.T_map_body}, u.covariance, u.health}, 1e3 * off.norm()});
   });
   feed(streams.packets, streams.imu, **tracker);
-  out.body = unseen::judge(poses, streams.job.truth, from).figures;
+  const TimeNs start = streams.job.start.t, from = start + kJudgedAfter;
+  CalibratedRun out{judged(poses, streams.job.truth, from, std::numeric_limits<TimeNs>::max()), {}};
+  for (TimeNs t = start; !poses.empty() && t + kNsPerS <= poses.back().body.pose.t + kNsPerS / 10;
+       t += kNsPerS)
+    out.by_second.push_back(judged(poses, streams.job.truth, std::max(t, from), t + kNsPerS));
   return out;
 }
 
-void print_cells(const CalibratedRun& run) {
+void print_cells(const CalibratedPart& run) {
   const unseen::RunFigures& f = run.body;
   if (!f.fault.empty())
     std::printf(" %s | - | - | - | %.0f | - |", f.fault.c_str(), 100 * f.tracking);
@@ -117,14 +141,24 @@ void print_cells(const CalibratedRun& run) {
                 100 * f.tracking, 100.0 * f.silent / std::max(1, f.poses));
 }
 
-Status print_row(const Streams& streams, const std::string& name, const GivenWrong& wrong) {
+/// A row of the other table.
+struct SecondRow {
+  std::string recording, words;
+  std::size_t second;
+  CalibratedPart told;
+};
+
+Status print_row(const Streams& streams, const std::string& name, const GivenWrong& wrong,
+                 std::vector<SecondRow>& by_second) {
   Streams spoilt = streams;
   if (auto ok = spoil(wrong, spoilt); !ok) return ok.error();
   std::printf("| %s | %s |", name.c_str(), wrong.words.c_str());
   for (const bool stated : {false, true}) {
     const auto run = tracked(spoilt, streams.job.setup.T_body_cam, stated);
     if (!run) return run.error();
-    print_cells(*run);
+    print_cells(run->whole);
+    for (std::size_t k = 0; stated && k < run->by_second.size(); ++k)
+      by_second.push_back({name, wrong.words, k, run->by_second[k]});
   }
   std::printf("\n");
   std::fflush(stdout);
@@ -143,14 +177,23 @@ Status print_calibration_errors(const Selection& selection, int draws) {
       "| told: camera mm | told: body mm | told: ARE deg | told: NEES/6 | told: tracking %% | told: silently "
       "wrong %% |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  std::vector<SecondRow> by_second;
   for (const BenchRecording& recording : *recordings) {
     const auto streams = load_streams(recording, *config);
     if (!streams) return streams.error();
     for (const GivenWrong& wrong : kGivenWrong)
-      if (auto ok = print_row(*streams, recording.name, wrong); !ok) return ok;
+      if (auto ok = print_row(*streams, recording.name, wrong, by_second); !ok) return ok;
     for (int draw = 1; draw <= draws; ++draw)
-      if (auto ok = print_row(*streams, recording.name, drawn(draw)); !ok) return ok;
+      if (auto ok = print_row(*streams, recording.name, drawn(draw), by_second); !ok) return ok;
   }
+  std::printf(
+      "\n## Told, by second of data\n\n| recording | given wrong | second | camera mm | NEES/6 | tracking %% "
+      "|\n"
+      "|---|---|---|---|---|---|\n");
+  for (const auto& [recording, words, second, told] : by_second)
+    if (told.body.fault.empty())
+      std::printf("| %s | %s | %zu | %.2f | %.3f | %.0f |\n", recording.c_str(), words.c_str(), second,
+                  told.camera_mm, told.body.nees6, 100 * told.body.tracking);
   return {};
 }
 

@@ -10,9 +10,10 @@ namespace evpose {
 namespace {
 
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
-constexpr double kConfirmed_s = 0.04;     // four looks: a few pieces of contours agree by chance for a moment
-constexpr double kContradicted_s = 0.05;  // by chance, few contours have events for so long
-constexpr double kHopeless_s = 1;         // without a search
+constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
+constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
+constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
+constexpr double kHopeless_s = 1;           // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
 constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
 constexpr const char* kContradiction =
@@ -57,7 +58,7 @@ void PoseSupervisor::take_verdict(double span_s) {
   confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + span_s : 0;
   if (verdict == PoseVerdict::confirmed) contradicted_s_ = 0;
   if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
-  verified_ |= confirmed_s_ > kConfirmed_s;
+  verified_ |= confirmed_s_ > (verifying() ? kFoundConfirmed_s : kConfirmed_s);
 }
 
 bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared recordings."""
+"""docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared
+recordings and on simulated flights."""
 import experiments
 import paper_evaluation
+import paper_flights
 import tables
 
 OF_MAP = "paper: signs of the map alone"
@@ -13,7 +15,7 @@ EARLY_STAGE = ["paper", OF_MAP, "paper: both polarities everywhere", "paper: no 
 
 def measure(bench, recording):
     """Rows of `evpose bench paper` by variant. The signs of the map are those that the defaults learn on the same flight:
-    the shared maps state none."""
+    their maps state none."""
     rows = experiments.variants(bench, "paper", recording, *(QUICK if bench.quick else []))
     if bench.quick:
         return rows
@@ -63,10 +65,13 @@ def section(measured, names):
 
 def make(bench):
     measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
+    flown = {flight.name: measure(bench, flight) for flight in paper_flights.hard(bench)}
     names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
     steps = ["paper", *(name for name in names if name[0].isdigit())]
-    return bench.write_page("paper", {"steps": section(measured, steps), "parts": section(measured, PARTS),
-                                      "early stage": section(measured, EARLY_STAGE)})
+    return bench.write_page("paper", {
+        "steps": section(measured, steps), "steps, simulated": section(flown, steps), "parts": section(measured, PARTS),
+        "parts, simulated": section(flown, PARTS), "early stage": section(measured, EARLY_STAGE),
+        "early stage, simulated": section(flown, EARLY_STAGE), "classes": paper_flights.classes(bench)})
 
 
 def make_evaluation(bench):

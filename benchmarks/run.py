@@ -25,7 +25,7 @@ BENCHMARKS = {
     "simulator": ("simulator", "make", "simulated flights", "2 h"),
     "unseen": ("experiments", "make_unseen", "flights that nobody has looked at, with all that may be wrong", "3 h"),
     "ablation": ("experiments", "make_ablation", "the tracker without one of its parts; its picture", "10 min"),
-    "paper": ("paper", "make", "from the paper's form to the defaults, one replacement at a time", "15 min"),
+    "paper": ("paper", "make", "from the paper's form to the defaults, one replacement at a time", "40 min"),
     "paper-evaluation": ("paper", "make_evaluation", "its evaluation: distributions, rates, a real chunk", "5 min"),
     "frames": ("frames", "make", "frames alone, events alone and both, on simulated flights", "15 min"),
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),

@@ -4,6 +4,7 @@ recordings and on simulated flights."""
 import experiments
 import paper_evaluation
 import paper_flights
+import paper_maps
 import tables
 
 OF_MAP = "paper: signs of the map alone"
@@ -64,14 +65,16 @@ def section(measured, names):
 
 
 def make(bench):
-    measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
+    built = paper_maps.sections(bench)
     flown = {flight.name: measure(bench, flight) for flight in paper_flights.hard(bench)}
+    classes = paper_flights.classes(bench)
+    measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
     names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
     steps = ["paper", *(name for name in names if name[0].isdigit())]
     return bench.write_page("paper", {
         "steps": section(measured, steps), "steps, simulated": section(flown, steps), "parts": section(measured, PARTS),
         "parts, simulated": section(flown, PARTS), "early stage": section(measured, EARLY_STAGE),
-        "early stage, simulated": section(flown, EARLY_STAGE), "classes": paper_flights.classes(bench)})
+        "early stage, simulated": section(flown, EARLY_STAGE), "classes": classes, **built})
 
 
 def make_evaluation(bench):

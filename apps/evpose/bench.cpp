@@ -7,6 +7,7 @@
 
 #include "commands.h"
 #include "evpose/bench/experiments/calibration.h"
+#include "evpose/bench/experiments/corner_repeatability.h"
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
 #include "evpose/bench/experiments/realtime.h"
@@ -100,6 +101,15 @@ void add_event_origins(CLI::App& bench, Run& run) {
   add_settings(*command, request->assignments);
   command->callback(
       [=, &run] { run = [=] { return exit_status(experiments::print_event_origins(*request)); }; });
+}
+
+void add_corners(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand(
+      "corners", "How often corners in the events, and contours of the map, are seen again");
+  auto selection = std::make_shared<experiments::Selection>();
+  add_selection(*command, *selection);
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_corner_repeatability(*selection)); }; });
 }
 
 void add_faults(CLI::App& bench, Run& run) {
@@ -213,6 +223,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_calibration(*bench, run);
   add_calibration_errors(*bench, run);
   add_relocalization(*bench, run);
+  add_corners(*bench, run);
   add_event_origins(*bench, run);
   add_faults(*bench, run);
   add_realtime(*bench, run);

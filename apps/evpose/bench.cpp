@@ -10,6 +10,7 @@
 #include "evpose/bench/experiments/corner_repeatability.h"
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
+#include "evpose/bench/experiments/published.h"
 #include "evpose/bench/experiments/realtime.h"
 #include "evpose/bench/experiments/relocalization.h"
 #include "evpose/bench/experiments/residuals.h"
@@ -35,8 +36,27 @@ void add_selection(CLI::App& command, experiments::Selection& selection) {
   add_settings(command, selection.assignments);
 }
 
+/// Published sequences in place of our recordings.
+void add_published(CLI::App& command, experiments::PublishedRequest& request) {
+  const auto add = [&](const char* name, std::string& folder, const std::string& what) {
+    command
+        .add_option(name, folder,
+                    "folder with " + what +
+                        " sequences, in place of our recordings: the paper's form and the defaults, from "
+                        "ground truth. "
+                        "Beside each its map or cloud, SEQUENCE_contours.ply or SEQUENCE_cloud.ply")
+        ->excludes("--recording")
+        ->excludes("--variant")
+        ->excludes("--only");
+  };
+  add("--vector", request.vector, "VECtor");
+  add("--tum-vie", request.tum_vie, "TUM-VIE");
+  command.add_option("--maps", request.maps, "folder for the maps that are built of these clouds")
+      ->capture_default_str();
+}
+
 void add_variants(CLI::App& bench, Run& run, const char* name, const char* what,
-                  const std::vector<experiments::Variant>& variants) {
+                  const std::vector<experiments::Variant>& variants, bool with_published = false) {
   auto* command = bench.add_subcommand(name, what);
   auto request = std::make_shared<experiments::VariantsRequest>();
   add_selection(*command, request->selection);
@@ -47,9 +67,14 @@ void add_variants(CLI::App& bench, Run& run, const char* name, const char* what,
   own->needs(command->add_option("--map", request->own.map, "map for --recording"));
   command->add_option("--occluders", request->own.occluders, "mesh that hides contours, for --recording")
       ->needs(own);
+  auto published = std::make_shared<experiments::PublishedRequest>();
+  if (with_published) add_published(*command, *published);
   command->callback([=, &run, &variants] {
     request->own.name = request->own.folder;
-    run = [=, &variants] { return exit_status(experiments::print_variants(variants, *request)); };
+    if (!published->vector.empty() || !published->tum_vie.empty())
+      run = [=] { return exit_status(experiments::print_published(*published)); };
+    else
+      run = [=, &variants] { return exit_status(experiments::print_variants(variants, *request)); };
   });
 }
 
@@ -219,7 +244,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_variants(*bench, run, "ablation", "What each module of the tracker brings",
                experiments::ablation_variants());
   add_variants(*bench, run, "paper", "From the paper's form to the defaults, one replacement at a time",
-               experiments::paper_variants());
+               experiments::paper_variants(), true);
   add_calibration(*bench, run);
   add_calibration_errors(*bench, run);
   add_relocalization(*bench, run);

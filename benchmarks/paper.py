@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared
-recordings and on simulated flights."""
+recordings; and the pages beside it."""
 import experiments
 import paper_evaluation
 import paper_flights
@@ -65,16 +65,40 @@ def section(measured, names):
 
 
 def make(bench):
-    built = paper_maps.sections(bench)
-    flown = {flight.name: measure(bench, flight) for flight in paper_flights.hard(bench)}
-    classes = paper_flights.classes(bench)
     measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
-    names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
-    steps = ["paper", *(name for name in names if name[0].isdigit())]
-    return bench.write_page("paper", {
-        "steps": section(measured, steps), "steps, simulated": section(flown, steps), "parts": section(measured, PARTS),
-        "parts, simulated": section(flown, PARTS), "early stage": section(measured, EARLY_STAGE),
-        "early stage, simulated": section(flown, EARLY_STAGE), "classes": classes, **built})
+    return bench.write_page("paper", {"steps": section(measured, steps_of(measured)), "parts": section(measured, PARTS),
+                                      "early stage": section(measured, EARLY_STAGE)})
+
+
+def steps_of(measured):
+    names = dict.fromkeys(name for rows in measured.values() for name in rows)
+    return ["paper", *(name for name in names if name[0].isdigit())]
+
+
+def make_flights(bench):
+    """docs/results/paper-flights.md"""
+    measured = {flight.name: measure(bench, flight) for flight in paper_flights.hard(bench)}
+    return bench.write_page("paper-flights", {"steps": section(measured, steps_of(measured)),
+                                              "parts": section(measured, PARTS),
+                                              "early stage": section(measured, EARLY_STAGE)})
+
+
+def make_classes(bench):
+    """docs/results/paper-classes.md"""
+    return bench.write_page("paper-classes", {"classes": paper_flights.classes(bench)})
+
+
+def make_map(bench):
+    """docs/results/paper-map.md"""
+    return bench.write_page("paper-map", paper_maps.sections(bench))
+
+
+def make_corners(bench):
+    """docs/results/paper-corners.md"""
+    only = ",".join(recording.name for recording in bench.peers())
+    printed = bench.once("paper corners",
+                         lambda: bench.run("bench", "corners", bench.shared / "data/peer", "--only", only))
+    return bench.write_page("paper-corners", {"corners": printed.strip().splitlines()})
 
 
 def make_evaluation(bench):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/paper-evaluation.md: the evaluation of EV-Pose with its form and with the defaults: distributions of the error,
-relative errors, rates of updates, repeatability of corners, a real chunk."""
+relative errors, rates of updates, a real chunk."""
 import json
 import pathlib
 import subprocess
@@ -141,16 +141,7 @@ def real_chunk(bench):
     return tables.table(["form", "status", "mean ATE mm", "largest mm", "mean ARE deg", "sharpness", "with the truth"], rows)
 
 
-def corners(bench, peers):
-    """Repeatability of corners in the events beside that of the map's contours."""
-    printed = bench.once("paper evaluation: corners",
-                         lambda: bench.run("bench", "corners", bench.shared / "data/peer", "--only",
-                                           ",".join(r.name for r in peers)))
-    return printed.strip().splitlines()
-
-
 def sections(bench):
     peers = bench.peers()
     return {"distributions": distributions(bench, peers), "relative": relative(bench, peers), "rates": rates(bench, peers),
-            "corners": corners(bench, peers),
             "real chunk": real_chunk(bench)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The paper's map (`evpose map build --preset paper`) beside ours in docs/results/paper.md: errors, and tracking with both."""
+"""The paper's map (`evpose map build --preset paper`) beside ours, docs/results/paper-map.md: errors, and tracking with both."""
 import harness
 import maps
 import tables
@@ -33,4 +33,4 @@ def sections(bench):
     rows = [[name, *(measured[place][kind]["tracking"][name][form] for kind in KINDS for form in FORMS)]
             for place, recordings in places.items() for name in (r.name for r in recordings)]
     heads = ["recording", *(f"map: {kind}, form: {form}" for kind in KINDS for form in FORMS)]
-    return {"maps": tables.table(maps.SCORE, errors), "maps, tracking": tables.table(heads, rows)}
+    return {"errors": tables.table(maps.SCORE, errors), "tracking": tables.table(heads, rows)}

@@ -96,7 +96,7 @@ class CameraView {
   std::optional<Eigen::Vector2d> pixel(const Eigen::Vector3d& point_map) const {
     const Eigen::Vector3d point_cam = T_map_cam_.inverse() * point_map;
     if (point_cam.z() < kNear_m) return std::nullopt;
-    const auto pixel = job_.setup.camera->project(point_cam);
+    auto pixel = job_.setup.camera->project(point_cam);
     if (!pixel || !job_.setup.camera->size().contains(*pixel, kMargin_px) || depth_.hides(point_cam))
       return std::nullopt;
     return pixel;

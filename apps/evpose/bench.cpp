@@ -39,15 +39,13 @@ void add_selection(CLI::App& command, experiments::Selection& selection) {
 /// Published sequences in place of our recordings.
 void add_published(CLI::App& command, experiments::PublishedRequest& request) {
   const auto add = [&](const char* name, std::string& folder, const std::string& what) {
-    command
-        .add_option(name, folder,
-                    "folder with " + what +
-                        " sequences, in place of our recordings: the paper's form and the defaults, from "
-                        "ground truth. "
-                        "Beside each its map or cloud, SEQUENCE_contours.ply or SEQUENCE_cloud.ply")
-        ->excludes("--recording")
-        ->excludes("--variant")
-        ->excludes("--only");
+    auto* option = command.add_option(
+        name, folder,
+        "folder with " + what +
+            " sequences, in place of our recordings: the paper's form and the defaults, from ground truth. "
+            "Beside each its map or cloud, SEQUENCE_contours.ply or SEQUENCE_cloud.ply");
+    for (const char* other : {"folder", "--recording", "--variant", "--only", "--set"})
+      option->excludes(other);
   };
   add("--vector", request.vector, "VECtor");
   add("--tum-vie", request.tum_vie, "TUM-VIE");

@@ -183,6 +183,8 @@ class DatasetsTest(unittest.TestCase):
                             (("--tum-vie", self.root / "vector"), "holds no TUM-VIE sequence")):
             told = self.published(*words, status=2)
             self.assertRegex(told.stderr, rf"^evpose: .*{says}.*\n$")
+        for other in ((self.root / "vector",), ("--set", "rate_hz=100"), ("--variant", "paper"), ("--only", "a")):
+            self.published("--vector", self.root / "vector", *other, status=2)
         told = self.published("--vector", self.root / "vector", status=2)
         self.assertRegex(told.stderr, r"^evpose: .*no map of it; put .*desk_normal1_contours\.ply or .*desk_normal1_cloud\.ply there\n$")
         self.assertIn("| desk_normal1 | paper | - | - | - |", told.stdout)

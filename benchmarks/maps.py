@@ -17,6 +17,8 @@ SIMULATED, SIMULATED_S = ["indoor_spiral", "outdoor_spiral"], 5
 REAL = {"hall_lidar_4cm": [], "campus_building_livox": ["--viewpoint", "0,0,0", "--set", "noise=0.015"],
         "street_lidar_scan": ["--viewpoint", "0,0,0"], "room_laser_scan": [], "office_rgbd": ["--viewpoint", "0,0,0"]}
 NUMBER = r"([\d.]+)"
+SCORE = ["cloud", "built m", "true m", "precision 5 / 10 mm", "recall 5 / 10 mm", "p50 / mean / p95 mm",
+         "error / sigma: rms, bulk", "outliers"]
 UNCERTAIN = "built, ordinary calibration"
 # Groups of planes that belong to one surface.
 SURFACE_RAD, SURFACE_M, SURFACES, LOOKED_AT = np.radians(3), 0.1, 10, 60
@@ -122,9 +124,7 @@ def measure_cloud(bench, cloud, more):
 
 def make(bench):
     measured = {scene.name: bench.once(f"map: {scene.name}", lambda: measure_scene(bench, scene)) for scene in scenes(bench)}
-    contours = tables.table(["cloud", "built m", "true m", "precision 5 / 10 mm", "recall 5 / 10 mm", "p50 / mean / p95 mm",
-                             "error / sigma: rms, bulk", "outliers"],
-                            [score_row(name, m["score"]) for name, m in measured.items()])
+    contours = tables.table(SCORE, [score_row(name, m["score"]) for name, m in measured.items()])
     rivals = {name: {start: cell for start, cell in rival_cells(m["score"]).items()} for name, m in measured.items()}
     tracking = {name: rows for m in measured.values() for name, rows in m["tracking"].items()}
     real = [bench.once(f"map: {cloud}", lambda: measure_cloud(bench, cloud, more))

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared recordings."""
+"""docs/results/paper.md: from the paper's form to the defaults, one replacement at a time, on the shared
+recordings; and the pages beside it."""
 import experiments
 import paper_evaluation
+import paper_flights
+import paper_maps
 import tables
 
 OF_MAP = "paper: signs of the map alone"
@@ -13,7 +16,7 @@ EARLY_STAGE = ["paper", OF_MAP, "paper: both polarities everywhere", "paper: no 
 
 def measure(bench, recording):
     """Rows of `evpose bench paper` by variant. The signs of the map are those that the defaults learn on the same flight:
-    the shared maps state none."""
+    their maps state none."""
     rows = experiments.variants(bench, "paper", recording, *(QUICK if bench.quick else []))
     if bench.quick:
         return rows
@@ -63,10 +66,39 @@ def section(measured, names):
 
 def make(bench):
     measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
-    names = list(dict.fromkeys(name for rows in measured.values() for name in rows))
-    steps = ["paper", *(name for name in names if name[0].isdigit())]
-    return bench.write_page("paper", {"steps": section(measured, steps), "parts": section(measured, PARTS),
+    return bench.write_page("paper", {"steps": section(measured, steps_of(measured)), "parts": section(measured, PARTS),
                                       "early stage": section(measured, EARLY_STAGE)})
+
+
+def steps_of(measured):
+    names = dict.fromkeys(name for rows in measured.values() for name in rows)
+    return ["paper", *(name for name in names if name[0].isdigit())]
+
+
+def make_flights(bench):
+    """docs/results/paper-flights.md"""
+    measured = {flight.name: measure(bench, flight) for flight in paper_flights.hard(bench)}
+    return bench.write_page("paper-flights", {"steps": section(measured, steps_of(measured)),
+                                              "parts": section(measured, PARTS),
+                                              "early stage": section(measured, EARLY_STAGE)})
+
+
+def make_classes(bench):
+    """docs/results/paper-classes.md"""
+    return bench.write_page("paper-classes", {"classes": paper_flights.classes(bench)})
+
+
+def make_map(bench):
+    """docs/results/paper-map.md"""
+    return bench.write_page("paper-map", paper_maps.sections(bench))
+
+
+def make_corners(bench):
+    """docs/results/paper-corners.md"""
+    only = ",".join(recording.name for recording in bench.peers())
+    printed = bench.once("paper corners",
+                         lambda: bench.run("bench", "corners", bench.shared / "data/peer", "--only", only))
+    return bench.write_page("paper-corners", {"corners": printed.strip().splitlines()})
 
 
 def make_evaluation(bench):

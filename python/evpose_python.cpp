@@ -110,9 +110,27 @@ class PyTracker {
     return give();
   }
 
+  /// Rows from the top.
+  std::vector<Update> add_frame(TimeNs t_ns, const Column<std::uint8_t>& grey, TimeNs exposure_ns) {
+    if (grey.ndim() != 2 || grey.shape(0) != size_.height || grey.shape(1) != size_.width)
+      throw py::value_error(text("frame: give grey levels of shape (", size_.height, ", ", size_.width, ")"));
+    if (t_ns <= last_frame_) throw py::value_error("frame: t does not go on; sort the frames");
+    if (exposure_ns < 0 || exposure_ns > kLongestExposure)
+      throw py::value_error("frame: the exposure is out of range; give nanoseconds, at most ten seconds");
+    last_frame_ = t_ns;
+    tracker_->add_frame({t_ns, exposure_ns, size_, {grey.data(), grey.data() + grey.size()}});
+    return give();
+  }
+
+  std::vector<Update> events_complete_until(TimeNs t_ns) {
+    tracker_->events_complete_until(t_ns);
+    return give();
+  }
+
   bool has_imu() const { return has_imu_; }
 
  private:
+  static constexpr TimeNs kLongestExposure = 10 * kNsPerS;
   static constexpr std::int64_t kLongestPacket_us = 1'000'000;
 
   void take(EventPacket& packet) {
@@ -130,7 +148,7 @@ class PyTracker {
   ImageSize size_;
   bool has_imu_ = false;
   std::int64_t last_us_ = INT64_MIN;
-  TimeNs last_imu_ = INT64_MIN;
+  TimeNs last_imu_ = INT64_MIN, last_frame_ = INT64_MIN;
   std::unique_ptr<Tracker> tracker_;
   std::deque<Update> made_;
   std::function<void(const Update&)> callback_;
@@ -171,7 +189,7 @@ PYBIND11_MODULE(evpose, m) {
       .def_readonly("points", &Update::points, "chosen map points")
       .def_readonly("points_matched", &Update::points_matched, "of these, with events near by");
   py::class_<PyTracker>(
-      m, "Tracker", "Events and IMU samples in order of time in, poses out; ValueError says what is wrong")
+      m, "Tracker", "Events, IMU samples and frames in order of time in, poses out; ValueError says what is wrong")
       .def(py::init<const fs::path&, const fs::path&, const Eigen::Matrix4d&, TimeNs, const Eigen::Vector3d&,
                     const fs::path&, const fs::path&, const std::map<std::string, py::object>&>(),
            "map"_a, "calibration"_a, "T_map_body"_a, "t_ns"_a, "velocity"_a = Eigen::Vector3d(0, 0, 0),
@@ -183,6 +201,12 @@ PYBIND11_MODULE(evpose, m) {
            "int64 microseconds, uint16, uint16, 0 or 1; gives the updates that were made")
       .def("add_imu", &PyTracker::add_imu, "t_ns"_a, "samples"_a,
            "int64 ns of shape (n,); (n, 6): gyro rad/s, accel m/s^2; gives the updates that were made")
+      .def("add_frame", &PyTracker::add_frame, "t_ns"_a, "grey"_a, "exposure_ns"_a = 0,
+           "int64 ns, middle of the exposure; uint8 of shape (height, width) through the event camera's pixels, before "
+           "the events after it; gives the updates that were made")
+      .def("events_complete_until", &PyTracker::events_complete_until, "t_ns"_a,
+           "int64 ns: no event before it will come, so that updates up to it, by frames alone, need not wait for one; "
+           "gives the updates that were made")
       .def_property_readonly("has_imu", &PyTracker::has_imu, "the calibration knows where the IMU sits");
   bind_recordings(m);
   bind_maps(m);

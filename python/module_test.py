@@ -59,6 +59,26 @@ class ModuleTest(unittest.TestCase):
         errors = [np.linalg.norm(u.position - position(u.t_ns * 1e-9)) for u in updates]
         self.assertLess(np.median(errors), 0.05)
 
+    def test_frames_alone_move_the_pose(self):
+        """Fields of grey between the wall's contours, where the tracker believes to be 1 cm beside the truth."""
+        r, start = self.recording, np.eye(4)
+        start[:3, 3] = position(0) + [0, 0.01, 0]
+        errors = {}
+        for use in ("alone", "off"):
+            tracker = self.tracker(T_map_body=start, settings={"frames.use": use, "fusion.start_position_sigma_m": 0.01,
+                                                               "fusion.calibration.on": False})
+            updates, sent = [], 0
+            for t in range(0, 550_000_000, 33_000_000):
+                updates += tracker.add_frame(t, r.picture(position(t * 1e-9)), 1_000_000)
+                samples = (r.imu_t_ns >= sent) & (r.imu_t_ns < t + 40_000_000)
+                updates += tracker.add_imu(r.imu_t_ns[samples], r.imu[samples])
+                updates += tracker.events_complete_until(t + 30_000_000)
+                sent = t + 40_000_000
+            errors[use] = [abs(u.position[1] - position(u.t_ns * 1e-9)[1]) for u in updates]
+            self.assertGreater(len(updates), 100)
+        self.assertLess(errors["alone"][-1], 0.003)
+        self.assertGreater(errors["off"][-1], 0.006)
+
     def test_settings_are_those_of_the_program(self):
         updates = self.feed(self.tracker(settings={"rate_hz": 100}), 10_000)
         self.assertAlmostEqual(len(updates), 59, delta=1)
@@ -81,6 +101,14 @@ class ModuleTest(unittest.TestCase):
             tracker.add_imu([1], [[1, 2, 3]])
         with self.assertRaisesRegex(ValueError, "not finite"):
             tracker.add_imu([1], [[1, 2, 3, 4, 5, np.nan]])
+        grey = np.zeros((120, 160), np.uint8)
+        with self.assertRaisesRegex(ValueError, r"shape \(120, 160\)"):
+            tracker.add_frame(1, grey.T)
+        with self.assertRaisesRegex(ValueError, "exposure"):
+            tracker.add_frame(1, grey, -1)
+        tracker.add_frame(1, grey)
+        with self.assertRaisesRegex(ValueError, "does not go on"):
+            tracker.add_frame(1, grey)
 
     def test_recordings_are_arrays(self):
         r, read = self.recording, evpose.Recording(self.folder)

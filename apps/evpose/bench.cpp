@@ -7,8 +7,10 @@
 
 #include "commands.h"
 #include "evpose/bench/experiments/calibration.h"
+#include "evpose/bench/experiments/corner_repeatability.h"
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
+#include "evpose/bench/experiments/published.h"
 #include "evpose/bench/experiments/realtime.h"
 #include "evpose/bench/experiments/relocalization.h"
 #include "evpose/bench/experiments/residuals.h"
@@ -34,8 +36,25 @@ void add_selection(CLI::App& command, experiments::Selection& selection) {
   add_settings(command, selection.assignments);
 }
 
+/// Published sequences in place of our recordings.
+void add_published(CLI::App& command, experiments::PublishedRequest& request) {
+  const auto add = [&](const char* name, std::string& folder, const std::string& what) {
+    auto* option = command.add_option(
+        name, folder,
+        "folder with " + what +
+            " sequences, in place of our recordings: the paper's form and the defaults, from ground truth. "
+            "Beside each its map or cloud, SEQUENCE_contours.ply or SEQUENCE_cloud.ply");
+    for (const char* other : {"folder", "--recording", "--variant", "--only", "--set"})
+      option->excludes(other);
+  };
+  add("--vector", request.vector, "VECtor");
+  add("--tum-vie", request.tum_vie, "TUM-VIE");
+  command.add_option("--maps", request.maps, "folder for the maps that are built of these clouds")
+      ->capture_default_str();
+}
+
 void add_variants(CLI::App& bench, Run& run, const char* name, const char* what,
-                  const std::vector<experiments::Variant>& variants) {
+                  const std::vector<experiments::Variant>& variants, bool with_published = false) {
   auto* command = bench.add_subcommand(name, what);
   auto request = std::make_shared<experiments::VariantsRequest>();
   add_selection(*command, request->selection);
@@ -46,9 +65,14 @@ void add_variants(CLI::App& bench, Run& run, const char* name, const char* what,
   own->needs(command->add_option("--map", request->own.map, "map for --recording"));
   command->add_option("--occluders", request->own.occluders, "mesh that hides contours, for --recording")
       ->needs(own);
+  auto published = std::make_shared<experiments::PublishedRequest>();
+  if (with_published) add_published(*command, *published);
   command->callback([=, &run, &variants] {
     request->own.name = request->own.folder;
-    run = [=, &variants] { return exit_status(experiments::print_variants(variants, *request)); };
+    if (!published->vector.empty() || !published->tum_vie.empty())
+      run = [=] { return exit_status(experiments::print_published(*published)); };
+    else
+      run = [=, &variants] { return exit_status(experiments::print_variants(variants, *request)); };
   });
 }
 
@@ -100,6 +124,15 @@ void add_event_origins(CLI::App& bench, Run& run) {
   add_settings(*command, request->assignments);
   command->callback(
       [=, &run] { run = [=] { return exit_status(experiments::print_event_origins(*request)); }; });
+}
+
+void add_corners(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand(
+      "corners", "How often corners in the events, and contours of the map, are seen again");
+  auto selection = std::make_shared<experiments::Selection>();
+  add_selection(*command, *selection);
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_corner_repeatability(*selection)); }; });
 }
 
 void add_faults(CLI::App& bench, Run& run) {
@@ -209,10 +242,11 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_variants(*bench, run, "ablation", "What each module of the tracker brings",
                experiments::ablation_variants());
   add_variants(*bench, run, "paper", "From the paper's form to the defaults, one replacement at a time",
-               experiments::paper_variants());
+               experiments::paper_variants(), true);
   add_calibration(*bench, run);
   add_calibration_errors(*bench, run);
   add_relocalization(*bench, run);
+  add_corners(*bench, run);
   add_event_origins(*bench, run);
   add_faults(*bench, run);
   add_realtime(*bench, run);

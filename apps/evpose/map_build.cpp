@@ -19,6 +19,7 @@
 #include "evpose/io/motion/trajectory_tum.h"
 #include "evpose/map_build/gravity.h"
 #include "evpose/map_build/map_builder.h"
+#include "evpose/map_build/paper_map.h"
 #include "evpose/report/map_accuracy.h"
 #include "evpose/run/progress.h"
 #include "interrupt.h"
@@ -82,10 +83,12 @@ int build(const BuildRequest& request) {
   const InterruptGuard guard;
   ThreadPool pool(request.threads);
   Progress progress("building");
-  auto built = map_build::build_map(*std::move(cloud), config, pool, [&](double share) {
+  const auto go_on = [&](double share) {
     progress.at(share);
     return !InterruptGuard::interrupted();
-  });
+  };
+  auto built = request.preset.empty() ? map_build::build_map(*std::move(cloud), config, pool, go_on)
+                                      : map_build::build_paper_map(*std::move(cloud), pool, go_on);
   progress.done();
   if (InterruptGuard::interrupted()) return kInterruptedStatus;
   if (!built) return bad_input(built.error());
@@ -166,6 +169,14 @@ int compare(const CompareRequest& request) {
 
 /// By what is asked for: a whole map, a plan, or one tile of one.
 int build_or_plan(const CLI::App& command, const BuildRequest& request, const std::string& plan) {
+  if (command.count("--preset") > 0) {
+    if (request.preset != "paper")
+      return bad_input({"--preset " + request.preset, "there is no such preset", "known: paper"});
+    for (const char* other : {"--set", "--viewpoint", "--plan", "--tile"})
+      if (command.count(other) > 0)
+        return bad_input(
+            {other, "does not go with --preset", "the paper's map has no settings and no tiles"});
+  }
   if (command.count("--tile") > 0) {
     for (const char* other : {"--set", "--viewpoint", "--output", "--level"})
       if (command.count(other) > 0)
@@ -205,6 +216,8 @@ void add_map_build(CLI::App& map, std::function<int()>& run) {
       ->add_option("cloud", request->input, "points in metres, of one frame; with --tile a folder of tiles")
       ->required();
   command->add_option("-o,--output", request->output, "map file")->capture_default_str();
+  command->add_option("--preset", request->preset,
+                      "paper: the map as EV-Pose makes it: traced outlines of grown regions, nothing fitted");
   command->add_option("--set", request->assignments, "one setting, key=value")->allow_extra_args(false);
   command
       ->add_option("--viewpoint", request->viewpoints,

@@ -12,6 +12,7 @@ namespace evpose {
 
 struct BuildRequest {
   std::string input, output;  ///< cloud, or folder of tiles; map, or folder of tiles to make
+  std::string preset;         ///< "paper": the map of EV-Pose; empty: ours
   std::vector<std::string> assignments;
   std::vector<double> viewpoints;  ///< x, y, z of one after the other
   int threads = 1;

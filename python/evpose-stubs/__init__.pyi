@@ -52,7 +52,7 @@ class Update:
         """of these, with events near by"""
 
 class Tracker:
-    """Events and IMU samples in order of time in, poses out; ValueError says what is wrong"""
+    """Events, IMU samples and frames in order of time in, poses out; ValueError says what is wrong"""
 
     def __init__(
         self,
@@ -72,6 +72,10 @@ class Tracker:
         """int64 microseconds, uint16, uint16, 0 or 1; gives the updates that were made"""
     def add_imu(self, t_ns: ArrayLike, samples: ArrayLike) -> list[Update]:
         """int64 ns of shape (n,); (n, 6): gyro rad/s, accel m/s^2; gives the updates that were made"""
+    def add_frame(self, t_ns: int, grey: ArrayLike, exposure_ns: int = 0) -> list[Update]:
+        """int64 ns, middle of the exposure; uint8 of shape (height, width) through the event camera's pixels, before the events after it; gives the updates that were made"""
+    def events_complete_until(self, t_ns: int) -> list[Update]:
+        """int64 ns: no event before it will come, so that updates up to it, by frames alone, need not wait for one; gives the updates that were made"""
     @property
     def has_imu(self) -> bool:
         """the calibration knows where the IMU sits"""

@@ -3,6 +3,7 @@
 """Data sets as downloaded are tracked as our own recording of the same motion is. datasets_test.py EVPOSE"""
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -140,6 +141,53 @@ class DatasetsTest(unittest.TestCase):
         for path in (folder, folder / "flight.bag"):
             self.assert_same_run(self.tracked(path), expected)
         self.assertEqual(self.info(folder)["recording"]["groundtruth"], str(folder / "flight.bag"))
+
+    def published(self, *words, status=0):
+        result = run("-q", "bench", "paper", *words, "--maps", self.root / "maps")
+        self.assertEqual(result.returncode, status, result.stderr)
+        return result
+
+    def test_published_sequences_are_tracked_in_both_forms(self):
+        vector = layouts.write_vector(self.root / "vector", self.recording)
+        tum_vie = layouts.write_tum_vie(self.root / "tum/mocap-desk", self.recording)
+        for folder in (vector, tum_vie):
+            (folder / "contours.ply").rename(f"{folder}_contours.ply")
+        said = self.published("--vector", self.root / "vector", "--tum-vie", self.root / "tum").stdout
+        for layout, name in (("VECtor", "desk_normal1"), ("TUM-VIE", "mocap-desk")):
+            part = said.split(f"### {layout} sequence")[1].split("###")[0]
+            for form, most_mm in (("paper", 50), ("defaults", 10)):
+                ate = re.search(rf"\| {name} \| {form} \| ([\d.]+) \|", part)
+                self.assertTrue(ate, part)
+                self.assertLess(float(ate[1]), most_mm)
+                self.assertIn(f"| mean of 1 | {form} | {ate[1]} |", part)
+        self.assertFalse((self.root / "maps").exists())
+
+    def test_published_sequences_build_the_maps_of_their_clouds(self):
+        folder = layouts.write_tum_vie(self.root / "tum/mocap-desk", self.recording)
+        random = np.random.default_rng(1)
+        walls = random.random((12000, 3)) * [3, 3, 2] - [0, 1.5, 0]  # two walls and a floor before the camera
+        walls[:4000, 0], walls[4000:8000, 1], walls[8000:, 2] = 3, 1.5, 0
+        with open(f"{folder}_cloud.ply", "wb") as file:
+            file.write(f"ply\nformat binary_little_endian 1.0\nelement vertex {len(walls)}\nproperty float x\n"
+                       "property float y\nproperty float z\nend_header\n".encode() + walls.astype("<f4").tobytes())
+        said = self.published("--tum-vie", self.root / "tum").stdout
+        self.assertRegex(said, r"\| mocap-desk \| paper \| [\d.]+ \|")
+        built = [self.root / f"maps/mocap-desk_{form}.h5" for form in ("paper", "defaults")]
+        stamps = [path.stat().st_mtime_ns for path in built]
+        self.assertEqual(self.published("--tum-vie", self.root / "tum").stdout, said)
+        self.assertEqual([path.stat().st_mtime_ns for path in built], stamps)
+
+    def test_published_sequences_that_are_not_there_are_told_in_one_line(self):
+        layouts.write_vector(self.root / "vector", self.recording)
+        for words, says in ((("--vector", self.root / "nowhere"), "nowhere"),
+                            (("--tum-vie", self.root / "vector"), "holds no TUM-VIE sequence")):
+            told = self.published(*words, status=2)
+            self.assertRegex(told.stderr, rf"^evpose: .*{says}.*\n$")
+        for other in ((self.root / "vector",), ("--set", "rate_hz=100"), ("--variant", "paper"), ("--only", "a")):
+            self.published("--vector", self.root / "vector", *other, status=2)
+        told = self.published("--vector", self.root / "vector", status=2)
+        self.assertRegex(told.stderr, r"^evpose: .*no map of it; put .*desk_normal1_contours\.ply or .*desk_normal1_cloud\.ply there\n$")
+        self.assertIn("| desk_normal1 | paper | - | - | - |", told.stdout)
 
     def test_calibration_can_be_given(self):
         folder = self.recording.write(self.root / "own")

@@ -4,6 +4,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import stat
 import subprocess
@@ -148,6 +149,20 @@ class FramesTest(unittest.TestCase):
     def orb(self, *words):
         return subprocess.run([sys.executable, str(pathlib.Path(SOURCES) / "benchmarks/orb_slam3.py"), "--evpose", str(EVPOSE),
                                *map(str, words)], capture_output=True, text=True, timeout=200)
+
+    def test_contours_are_seen_again_more_often_than_chance_has_it(self):
+        """And corners in the events are found, a few of them where they were: the figures of `bench corners`."""
+        done = self.evpose("bench", "corners", self.root, "--only", "recording")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        cells = [cell.strip() for cell in done.stdout.strip().splitlines()[-1].strip("|").split("|")]
+        self.assertEqual(cells[0], "recording")
+        self.assertGreater(float(cells[1]), 0.1)
+        self.assertLess(float(cells[1]), 30)
+        shares = [[float(number) for number in re.findall(r"[\d.]+", cell)] for cell in cells[2:]]
+        self.assertEqual(len(shares), 6)
+        for seen, by_chance in shares[3:]:
+            self.assertGreater(seen, 1.5 * by_chance)
+        self.refused(self.evpose("bench", "corners", self.root / "nowhere"), "none of the wanted recordings")
 
     def test_orb_slam3_is_judged_after_alignment(self):
         program, vocabulary = self.root / "mono_inertial_euroc", self.root / "ORBvoc.txt"

@@ -201,6 +201,25 @@ class MapBuildTest(unittest.TestCase):
         self.assertEqual(row[3:7], ["100.0"] * 4)
         self.assertEqual(row[7], "0.00")
 
+    def test_the_papers_map_is_outlines_of_the_same_planes(self):
+        built = self.root / "paper.h5"
+        MapFileTest.run_evpose("map", "build", self.root / "cloud.ply", "--preset", "paper", "-o", built)
+        with h5py.File(built) as file:
+            kind, length, normals = file["contours/kind"][:], file["contours/length"][:], file["planes/normal"][:]
+            xyz = file["meta"].attrs["anchor"] + file["points/xyz"][:]
+        self.assertEqual(len(normals), 3)
+        self.assertEqual(set(kind), {2})
+        # Each of three faces has its own line around it.
+        self.assertAlmostEqual(length.sum(), 2 * (4 + 3.5 + 3.5), delta=3)
+        self.assertLess(np.median(np.sort(np.abs(xyz), axis=1)[:, 0]), 0.02)
+        for words, says in ((("--preset", "papers"), "known: paper"), (("--preset", "paper", "--set", "noise=0.01"), "--set"),
+                            (("--preset", "paper", "--viewpoint", "0,0,0"), "--viewpoint"),
+                            (("--preset", "paper", "--plan", str(self.root / "tiles")), "--plan")):
+            result = MapFileTest.run_evpose("map", "build", self.root / "cloud.ply", "-o", self.root / "none.h5", *words,
+                                            status=2)
+            self.assertRegex(result.stderr, rf"^evpose: .*{says}.*\n$")
+            self.assertFalse((self.root / "none.h5").exists())
+
     def test_what_is_no_cloud_is_told_in_one_line(self):
         bad = self.root / "bad.ply"
         write_ply(bad, self.points[:0])

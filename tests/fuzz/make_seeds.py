@@ -7,6 +7,7 @@ One folder for each target, named after it. A target without seeds here starts f
 import pathlib
 import struct
 import sys
+import zlib
 
 import bag_seeds
 import hdf5_seeds
@@ -255,7 +256,30 @@ def las():
     return bytes(head) + b"".join(struct.pack("<3iH6x", *(round(1000 * v) for v in p), 7) for p in corner())
 
 
+def png(kind, bits, samples, more=b"", interlaced=0):
+    """6 x 5 pixels of that colour type."""
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    def rows(width, height):
+        return height * (b"\x00" + bytes(range(1, 1 + (width * bits * samples + 7) // 8))) if width else b""
+
+    passes = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    data = b"".join(rows(len(range(x, 6, dx)), len(range(y, 5, dy))) for x, y, dx, dy in passes) if interlaced else rows(6, 5)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 6, 5, bits, kind, 0, 0, interlaced)) + more +
+            chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
+
+
+def palette():
+    data = b"PLTE" + bytes(range(48))
+    return struct.pack(">I", 48) + data + struct.pack(">I", zlib.crc32(data))
+
+
 SEEDS = {
+    "png": [lambda: png(0, 8, 1), lambda: png(0, 16, 1), lambda: png(0, 1, 1), lambda: png(2, 8, 3), lambda: png(6, 16, 4),
+            lambda: png(3, 4, 1, palette()), lambda: png(0, 8, 1, interlaced=1)],
+    "frame_list": [lambda: b"#timestamp [ns],filename\n0,fuzz\n33000000,fuzz,4000000\n",
+                   lambda: b"1403636579763555584,fuzz\n1403636579813555456, fuzz , 12\n", lambda: b"5,fuzz\n4,fuzz\n"],
     "clouds": [lambda: ply("ascii"), lambda: ply("binary_little_endian"), lambda: ply("binary_big_endian"),
                lambda: pcd("ascii"), lambda: pcd("binary"), lambda: pcd("binary_compressed"), las],
     "mavlink": [mavlink],

@@ -14,6 +14,7 @@
 #include "evpose/core/parallel.h"
 #include "evpose/core/thinned.h"
 #include "evpose/map/triangulation.h"
+#include "evpose/map_build/contour_points.h"
 #include "evpose/map_build/contrast.h"
 #include "evpose/map_build/curved_planes.h"
 #include "evpose/map_build/cylinders.h"
@@ -28,32 +29,6 @@ using Clock = std::chrono::steady_clock;
 double seconds(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
 const Error kGivenUp{"map build", "interrupted", "nothing was written"};
-
-void add_points(const LineSegment& segment, std::int32_t number, std::int8_t contrast, double spacing_m,
-                ContourMap& map) {
-  const int count = std::max(1, static_cast<int>(std::lround(segment.length_m() / spacing_m)));
-  ContourPoint p;
-  // Where the faces run uneven beside it, an edge is turned a little against its planes.
-  const Eigen::Vector3d along = segment.tangent();
-  const auto across = [&](const Eigen::Vector3d& normal) -> Eigen::Vector3f {
-    const Eigen::Vector3d out = normal - along.dot(normal) * along;
-    return out.norm() > 0.5 ? Eigen::Vector3f(out.normalized().cast<float>()) : Eigen::Vector3f::Zero();
-  };
-  p.normal = across(segment.normal_a);
-  p.normal_b = across(segment.normal_b);
-  p.tangent = along.cast<float>();
-  p.length = static_cast<float>(segment.length_m() / count);
-  p.sigma = static_cast<float>(segment.sigma_m);
-  p.contour = number;
-  p.plane_a = segment.plane_a;
-  p.plane_b = segment.plane_b;
-  p.kind = segment.kind;
-  p.contrast = contrast;
-  for (int k = 0; k < count; ++k) {
-    p.position = (segment.begin + (segment.end - segment.begin) * ((k + 0.5) / count)).cast<float>();
-    map.points.push_back(p);
-  }
-}
 
 /// Corners of outlines near fitted contours go onto these, so that the surface ends where its contour is.
 Eigen::Vector3d snapped_to_contours(const Eigen::Vector3d& corner, const std::vector<LineSegment>& segments,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <limits>
 #include <vector>
 
 #include "evpose/core/config.h"
@@ -46,6 +47,17 @@ TEST(AtomicFile, SaysWhyItCannotWrite) {
   const TemporaryFolder folder;
   EXPECT_TRUE(says(error_line(write_text_file(folder / "none/a", "")), {"none/a", "No such file"}));
   EXPECT_TRUE(says(error_line(write_text_file(folder.path(), "")), {"is a folder"}));
+}
+
+TEST(FirstBytes, TakeNoMoreMemoryThanTheFileHasBytes) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a", "content");
+  const auto all = first_bytes(path, std::numeric_limits<std::size_t>::max());
+  ASSERT_TRUE(all.ok());
+  EXPECT_EQ(*all, "content");
+  EXPECT_LT(all->capacity(), 100U);
+  EXPECT_EQ(*first_bytes(path, 3), "con");
+  EXPECT_EQ(*first_bytes(folder.file("b", ""), 3), "");
 }
 
 TEST(LineReader, GivesEveryLineWithItsNumberAndOffset) {

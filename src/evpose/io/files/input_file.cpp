@@ -32,7 +32,7 @@ Expected<InputFile> open_to_read(const std::string& path) {
 Expected<std::string> first_bytes(const std::string& path, std::size_t most) {
   const auto file = open_to_read(path);
   if (!file) return file.error();
-  std::string bytes(most, '\0');
+  std::string bytes(std::min(most, static_cast<std::size_t>(file->size)), '\0');
   bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file->stream.get()));
   return bytes;
 }

@@ -74,10 +74,16 @@ Vector6d FrameInput::beside_constant_velocity(TimeNs t, TimeNs then, const Fusio
   return pose.minus(constant);
 }
 
-std::optional<RegistrationResult> FrameInput::measure(TimeNs t, const Seen& seen) {
+/// That is exposed by t; those before it are forgotten.
+std::optional<Frame> FrameInput::take_newest(TimeNs t) {
   std::optional<Frame> frame;
   for (; !waiting_.empty() && waiting_.front().end(camera_) <= t; waiting_.pop_front())
     frame = std::move(waiting_.front());
+  return frame;
+}
+
+std::optional<RegistrationResult> FrameInput::measure(TimeNs t, const Seen& seen) {
+  const std::optional<Frame> frame = take_newest(t);
   if (!frame || to_seconds(t - frame->t) > kTooOld_s) return {};
   const double since_last_s = last_ ? to_seconds(frame->t - *last_) : kFirstInterval_s;
   last_ = frame->t;

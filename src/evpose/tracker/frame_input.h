@@ -47,6 +47,8 @@ class FrameInput {
   };
   /// Measures the newest frame that is exposed by t, at the state of t; none if there is no new one.
   std::optional<RegistrationResult> measure(TimeNs t, const Seen& seen);
+  /// Frames that are exposed by t are not needed.
+  void pass_over(TimeNs t) { take_newest(t); }
   /// The motion at the end of an update, on the clock of the events.
   void remember(TimeNs t, const FusionState& state);
   /// Of that measurement.
@@ -65,6 +67,7 @@ class FrameInput {
   void rearrange_segments(std::span<const std::uint32_t> before, std::span<const int> map_contrast);
 
  private:
+  std::optional<Frame> take_newest(TimeNs t);
   struct Motion {
     TimeNs t;
     Eigen::Vector3d velocity, angular_rate;  ///< map frame; body frame

@@ -340,29 +340,6 @@ ContourOffset Tracker::contour_offset(const SampleOffset& offset, double concent
   return out;
 }
 
-/// With a frame that has been exposed since the last update, if there is one and it is believed. Where no
-/// events were used, `measured` becomes what it says.
-bool Tracker::fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured) {
-  if (!frames_) return false;
-  const auto found = aligning || supervisor_.searching() ? std::nullopt : frames_->measure(t, frame_view());
-  const bool used =
-      found &&
-      frames_->refusal(*found, fusion_->measured_covariance(), config_.health.innovation_gate).empty();
-  if (used) fuse(*found, frames_->offsets());
-  if (used && measured.inliers == 0) measured = *found;
-  frames_->remember(t, fusion_->state());
-  return used;
-}
-
-/// What a frame is measured with: the contours, and the state since they were projected.
-FrameInput::Seen Tracker::frame_view() const {
-  const NavState& now = fusion_->state().nav;
-  return {contours_.samples(),
-          fusion_->measured_covariance(),
-          {now.T_map_body.minus(projected_.T_map_body), now.velocity - projected_.velocity},
-          fusion_->state()};
-}
-
 /// With a share of its information.
 void Tracker::fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets,
                    double share) {

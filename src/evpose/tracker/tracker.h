@@ -131,6 +131,7 @@ class Tracker {
   int darker_side(std::uint32_t segment) const;
   ContourOffset contour_offset(const SampleOffset& offset, double concentration) const;
   bool fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured);
+  bool needs_no_frame() const;
   FrameInput::Seen frame_view() const;
   void fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets, double share = 1);
   bool frames_confirm(TimeNs t) const { return frames_ && frames_->confirms(t); }

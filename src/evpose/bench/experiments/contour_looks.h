@@ -73,7 +73,7 @@ class LookCounter {
     double samples = 0;
   };
   void build_bands(const RegistrationProblem& problem);
-  bool stands_alone(std::size_t sample, const RegistrationProblem& problem) const;
+  bool stands_alone(std::size_t k, const RegistrationProblem& problem) const;
   Gathered& add_sample(const ContourSample& sample, std::int64_t block,
                        const EventRegistration& registration);
 

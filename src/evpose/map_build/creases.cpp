@@ -25,6 +25,7 @@ constexpr double kCovered = 0.35;         // least share of a bin that its point
 constexpr double kAmbiguous = 1.5;        // noise: so near to the line a point may be of either plane
 constexpr double kFacetSin = 0.87;        // of the angle between facets of a column, pipe or vault, at most
 constexpr std::size_t kFewestPoints = 8;  // near the line
+constexpr double kMixed = 6;              // square of the noise per width: what points of its neighbours draw a face by
 constexpr int kLargestGap = 2;            // bins without support that a segment bridges
 
 /// Area that a plane's points stand for, in bins along a line, on one side of it.
@@ -82,6 +83,7 @@ struct Meeting {
   double gap_m = 0;      ///< nearer to the line a point may be of either plane
   double spacing_m = 0;  ///< median, of the points near the line
   double bin_m = 0;
+  double width_a_m = 0, width_b_m = 0;  ///< of the faces, across the line
   Support in_a = {}, in_b = {};
 };
 
@@ -170,11 +172,11 @@ std::optional<Meeting> CreaseFinder::meeting_of(const PlanePair& pair, const Con
   const FittedPlane& b = planes_.planes[static_cast<std::size_t>(pair.second)];
   Meeting out{pair, a, b, intersection(a, b, contact.sum / contact.count)};
   out.sine = a.normal.cross(b.normal).norm();
+  out.width_a_m = width_across(surface_, a, out.line);
+  out.width_b_m = width_across(surface_, b, out.line);
   // Narrow strips that turn a little are as likely facets of a rounded body as faces with an edge between
   // them.
-  if (out.sine < kFacetSin &&
-      std::max(width_across(surface_, a, out.line), width_across(surface_, b, out.line)) < kFacetWidth_m)
-    return {};
+  if (out.sine < kFacetSin && std::max(out.width_a_m, out.width_b_m) < kFacetWidth_m) return {};
   out.gap_m = kAmbiguous * surface_.scale.noise_m / std::max(out.sine, 0.3);
   const double widest = kBinSpacings * std::max(a.spacing_m, b.spacing_m) * 2 + out.gap_m;
   const NearLine near_a = near_line(surface_, a, out.line, widest),
@@ -248,7 +250,13 @@ LineSegment CreaseFinder::fit_segment(const Meeting& m, const Stretch& stretch) 
   segment.end = moved(t1, 0.5 * (t1 - t0));
   segment.normal_a = out_a;
   segment.normal_b = out_b;
-  segment.sigma_m = std::hypot(strip_a.sigma_m, strip_b.sigma_m) / (std::sqrt(2.0) * m.sine);
+  // Near its borders a face's points mix with those of its neighbours: the narrower it is, the more they draw it.
+  const double noise = surface_.scale.noise_m, mixed = kMixed * noise * noise;
+  const auto sigma_of = [&](const StripFit& strip, double width_m) {
+    return std::hypot(strip.sigma_m, mixed / std::max(width_m, noise));
+  };
+  segment.sigma_m =
+      std::hypot(sigma_of(strip_a, m.width_a_m), sigma_of(strip_b, m.width_b_m)) / (std::sqrt(2.0) * m.sine);
   return segment;
 }
 

@@ -25,8 +25,10 @@ constexpr double kCovered = 0.35;         // least share of a bin that its point
 constexpr double kAmbiguous = 1.5;        // noise: so near to the line a point may be of either plane
 constexpr double kFacetSin = 0.87;        // of the angle between facets of a column, pipe or vault, at most
 constexpr std::size_t kFewestPoints = 8;  // near the line
-constexpr double kMixed = 6;              // square of the noise per width: what points of its neighbours draw a face by
-constexpr int kLargestGap = 2;            // bins without support that a segment bridges
+constexpr double kMixed = 6;  // square of the noise per width: what points of its neighbours draw a face by
+constexpr double kExpected = 12;    // points of a face in the strip that tells whether it reaches the line
+constexpr double kReaching = 0.25;  // least share of them
+constexpr int kLargestGap = 2;      // bins without support that a segment bridges
 
 /// Area that a plane's points stand for, in bins along a line, on one side of it.
 struct Support {
@@ -73,6 +75,25 @@ Support support_of(const NearLine& near, double bin_m, double gap_m) {
   return out;
 }
 
+/// Whether a face goes on to the line: as dense there as further off, on the side of the sign and between two
+/// places.
+bool reaches_line(const NearLine& near, double t0, double t1, double side, double gap_m, double bin_m,
+                  double least_m) {
+  std::vector<double> beyond_gap;
+  double far = 0;
+  for (const Eigen::Vector2d& place : near.place) {
+    const double d = side * place.y() - gap_m;
+    if (place.x() < t0 || place.x() > t1 || d < 0 || d > 2 * bin_m) continue;
+    beyond_gap.push_back(d);
+    far += d > bin_m ? 1 : 0;
+  }
+  if (far == 0) return true;  // no wider than that, so nothing to compare with
+  const double per_m = far / bin_m, strip_m = std::max(kExpected / per_m, least_m);
+  const auto there =
+      std::count_if(beyond_gap.begin(), beyond_gap.end(), [&](double d) { return d < strip_m; });
+  return static_cast<double>(there) >= kReaching * per_m * strip_m;
+}
+
 /// The line in which two planes meet, and where their points lie beside it.
 struct Meeting {
   PlanePair pair;
@@ -84,6 +105,7 @@ struct Meeting {
   double spacing_m = 0;  ///< median, of the points near the line
   double bin_m = 0;
   double width_a_m = 0, width_b_m = 0;  ///< of the faces, across the line
+  NearLine near_a = {}, near_b = {};
   Support in_a = {}, in_b = {};
 };
 
@@ -179,15 +201,15 @@ std::optional<Meeting> CreaseFinder::meeting_of(const PlanePair& pair, const Con
   if (out.sine < kFacetSin && std::max(out.width_a_m, out.width_b_m) < kFacetWidth_m) return {};
   out.gap_m = kAmbiguous * surface_.scale.noise_m / std::max(out.sine, 0.3);
   const double widest = kBinSpacings * std::max(a.spacing_m, b.spacing_m) * 2 + out.gap_m;
-  const NearLine near_a = near_line(surface_, a, out.line, widest),
-                 near_b = near_line(surface_, b, out.line, widest);
-  std::vector<double> spacing = near_a.spacing;
-  spacing.insert(spacing.end(), near_b.spacing.begin(), near_b.spacing.end());
+  out.near_a = near_line(surface_, a, out.line, widest);
+  out.near_b = near_line(surface_, b, out.line, widest);
+  std::vector<double> spacing = out.near_a.spacing;
+  spacing.insert(spacing.end(), out.near_b.spacing.begin(), out.near_b.spacing.end());
   if (spacing.size() < kFewestPoints) return {};
   out.spacing_m = median(spacing);
   out.bin_m = kBinSpacings * out.spacing_m;
-  out.in_a = support_of(near_a, out.bin_m, out.gap_m);
-  out.in_b = support_of(near_b, out.bin_m, out.gap_m);
+  out.in_a = support_of(out.near_a, out.bin_m, out.gap_m);
+  out.in_b = support_of(out.near_b, out.bin_m, out.gap_m);
   return out;
 }
 
@@ -212,6 +234,10 @@ std::vector<CreaseFinder::Stretch> CreaseFinder::stretches_of(const Meeting& m,
     }
     double t0 = first * m.bin_m, t1 = (last + 1) * m.bin_m;
     if (t1 - t0 < std::max(config_.least_length_m, 2 * m.bin_m) || held < 2) continue;
+    const double noise = surface_.scale.noise_m;
+    if (!reaches_line(m.near_a, t0, t1, sides_a > 0 ? 1 : -1, m.gap_m, m.bin_m, noise) ||
+        !reaches_line(m.near_b, t0, t1, sides_b > 0 ? 1 : -1, m.gap_m, m.bin_m, noise))
+      continue;
     const double reach_m = m.bin_m + m.gap_m;
     t0 = snapped_to_third_plane(m.line, t0, reach_m, m.pair, thirds);
     t1 = snapped_to_third_plane(m.line, t1, reach_m, m.pair, thirds);
@@ -250,7 +276,8 @@ LineSegment CreaseFinder::fit_segment(const Meeting& m, const Stretch& stretch) 
   segment.end = moved(t1, 0.5 * (t1 - t0));
   segment.normal_a = out_a;
   segment.normal_b = out_b;
-  // Near its borders a face's points mix with those of its neighbours: the narrower it is, the more they draw it.
+  // Near its borders a face's points mix with those of its neighbours: the narrower it is, the more they draw
+  // it.
   const double noise = surface_.scale.noise_m, mixed = kMixed * noise * noise;
   const auto sigma_of = [&](const StripFit& strip, double width_m) {
     return std::hypot(strip.sigma_m, mixed / std::max(width_m, noise));

@@ -148,6 +148,51 @@ TEST(MapBuilder, AFaceTooNarrowForAPlaneStillMakesACrease) {
     EXPECT_TRUE(p.kind != ContourKind::crease || p.normal_b.norm() > 0.9F);
 }
 
+/// A front above a floor that goes on under it, from a height on.
+Expected<BuiltMap> front_above_floor(unsigned seed, double from_m, double height_m) {
+  Scan scan(seed);
+  scan.rectangle({-1, -0.6, 0}, {3.4, 0, 0}, {0, 1.5, 0}, 1000);
+  scan.rectangle({0, 0, from_m}, {1.4, 0, 0}, {0, 0, height_m}, 2500);
+  return build(scan.cloud());
+}
+
+TEST(MapBuilder, AFrontThatEndsAboveTheFloorHasNoEdgeWithIt) {
+  for (unsigned seed = 40; seed < 44; ++seed) {
+    for (const double from_m : {0.0, 0.08}) {
+      const auto built = front_above_floor(seed, from_m, 0.7);
+      ASSERT_TRUE(built) << built.error().line();
+      double length = 0;
+      for (std::size_t i = 0; i < built->map.points.size(); ++i) {
+        const ContourPoint& p = built->map.points[i];
+        const Eigen::Vector3d x = built->map.position(i);
+        if (p.kind == ContourKind::crease && std::hypot(x.y(), x.z()) < 0.02)
+          length += static_cast<double>(p.length);
+      }
+      if (from_m > 0)
+        EXPECT_LT(length, 0.2) << seed;  // of 1.4
+      else
+        EXPECT_GT(length, 1.2) << seed;
+    }
+  }
+}
+
+TEST(MapBuilder, TheNarrowerAFaceTheLessItsEdgeIsKnown) {
+  const auto sigma_m = [](double height_m) {
+    const auto built = front_above_floor(44, 0, height_m);
+    double sum = 0, count = 0;
+    for (std::size_t i = 0; i < built->map.points.size(); ++i) {
+      const Eigen::Vector3d x = built->map.position(i);
+      if (built->map.points[i].kind != ContourKind::crease || std::hypot(x.y(), x.z()) > 0.02) continue;
+      sum += static_cast<double>(built->map.points[i].sigma), ++count;
+    }
+    return sum / count;
+  };
+  const double wide = sigma_m(2), narrow = sigma_m(0.3);
+  const double mixed = 6 * kNoise * kNoise / std::sqrt(2.0);
+  EXPECT_NEAR(std::sqrt(narrow * narrow - wide * wide), mixed * std::sqrt(1 / (0.3 * 0.3) - 1 / (2 * 2.0)),
+              0.0008);
+}
+
 TEST(MapBuilder, TheSameBytesForAnyNumberOfThreads) {
   const auto one = build(room_corner(4), 1), three = build(room_corner(4), 3);
   ASSERT_TRUE(one && three);

@@ -89,8 +89,9 @@ class Camera:
         self.distortion = numbers("distortion_coeffs")
         self.model = re.search(r"distortion_model:\s*(\S+)", text)[1]
         self.width, self.height = (int(v) for v in numbers("resolution"))
-        rows = re.search(r"T_cam_imu:\s*\n((?:\s*-\s*\[[^\]]*\]\s*\n?){4})", text)[1]
-        self.T_cam_body = np.array([[float(v) for v in row.split(",")] for row in re.findall(r"\[([^\]]*)\]", rows)])
+        rows = re.search(r"T_cam_imu:\s*\n((?:\s*-\s*\[[^\]]*\]\s*\n?){4})", text)
+        self.T_cam_body = np.eye(4) if rows is None else np.array(  # without an IMU the camera is the body
+            [[float(v) for v in row.split(",")] for row in re.findall(r"\[([^\]]*)\]", rows[1])])
 
     def project(self, points):
         """Pixels, and where they are in front and within the lens's field."""

@@ -5,6 +5,7 @@ import experiments
 import paper_evaluation
 import paper_flights
 import paper_maps
+import paper_order
 import tables
 
 OF_MAP = "paper: signs of the map alone"
@@ -67,7 +68,7 @@ def section(measured, names):
 def make(bench):
     measured = {recording.name: measure(bench, recording) for recording in bench.peers()}
     return bench.write_page("paper", {"steps": section(measured, steps_of(measured)), "parts": section(measured, PARTS),
-                                      "early stage": section(measured, EARLY_STAGE)})
+                                      "early stage": section(measured, EARLY_STAGE), "order": paper_order.section(bench)})
 
 
 def steps_of(measured):

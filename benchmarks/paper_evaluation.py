@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/paper-evaluation.md: the evaluation of EV-Pose with its form and with the defaults: distributions of the error,
-relative errors, rates of updates, a real chunk."""
+relative errors, rates of updates, real recordings."""
 import json
 import pathlib
 import subprocess
@@ -10,9 +10,10 @@ import drawing
 import files
 import harness
 import numpy as np
+import paper_real
 import tables
 
-FORMS = {"paper": ("--preset", "paper"), "defaults": ()}
+FORMS = paper_real.FORMS
 PLACES = {"indoors": ["room_spiral", "room_720p", "room_people", "room_hover"], "outdoors": ["courtyard_landing"]}
 QUANTILES = (10, 25, 50, 75, 90, 95, 100)
 RATES_HZ = (100, 200, 300)
@@ -144,4 +145,4 @@ def real_chunk(bench):
 def sections(bench):
     peers = bench.peers()
     return {"distributions": distributions(bench, peers), "relative": relative(bench, peers), "rates": rates(bench, peers),
-            "real chunk": real_chunk(bench)}
+            "real chunk": real_chunk(bench), "board": paper_real.boards(bench), "star": paper_real.star(bench)}

@@ -4,6 +4,7 @@
 
     benchmarks/run.py list            names, what they make, how long they take
     benchmarks/run.py all             everything, one after the other
+    benchmarks/run.py evaluation      the evaluation of EV-Pose: every figure and table that can be made here
     benchmarks/run.py accuracy map    these
 
 A page keeps its words; the figures between its marks and its first line are written anew. What was measured with this
@@ -28,6 +29,7 @@ BENCHMARKS = {
     "paper": ("paper", "make", "from the paper's form to the defaults, one replacement at a time", "15 min"),
     "paper-flights": ("paper", "make_flights", "the same on six simulated flights: hard light, moving things", "5 min"),
     "paper-classes": ("paper", "make_classes", "the paper's form and the defaults by speed and turning", "15 min"),
+    "paper-long": ("paper_long", "make", "flights of 10 s, three seeds: errors, time by stage, memory", "25 min"),
     "paper-map": ("paper", "make_map", "the paper's map beside ours: errors, and tracking with both", "3 min"),
     "paper-corners": ("paper", "make_corners", "repeatability of corners in events, and of the map's contours", "1 min"),
     "paper-evaluation": ("paper", "make_evaluation", "its evaluation: distributions, rates, a real chunk", "5 min"),
@@ -57,10 +59,14 @@ BENCHMARKS = {
     "map-pictures": ("map_pictures", "make", "docs/images/map_*.png", "2 min"),
 }
 
+GROUPS = {"all": list(BENCHMARKS),
+          "evaluation": ["paper", "paper-evaluation", "paper-classes", "paper-flights", "paper-long", "paper-map",
+                         "paper-corners", "frames"]}
+
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="+", metavar="NAME", help="list, all, or names of the list")
+    parser.add_argument("names", nargs="+", metavar="NAME", help="list, all, evaluation, or names of the list")
     parser.add_argument("--evpose", default=harness.ROOT / "build/release/apps/evpose/evpose", type=pathlib.Path)
     parser.add_argument("--microbench", type=pathlib.Path,
                         default=harness.ROOT / "build/bench/src/evpose/bench/micro/evpose_microbench")
@@ -73,7 +79,7 @@ def parse():
     parser.add_argument("--minutes", type=float, default=0,
                         help="of unseen: after which no seed is begun; the same command goes on")
     options = parser.parse_args()
-    unknown = set(options.names) - set(BENCHMARKS) - {"all", "list"}
+    unknown = set(options.names) - set(BENCHMARKS) - set(GROUPS) - {"list"}
     if unknown:
         parser.error(f"no such benchmark: {', '.join(sorted(unknown))}; see benchmarks/run.py list")
     return options
@@ -91,9 +97,10 @@ def main():
     if options.fresh:
         bench.forget()
     failed = []
-    for name in BENCHMARKS if "all" in options.names else options.names:
-        module, function, _, _ = BENCHMARKS[name]
-        print(name, flush=True)
+    names = list(dict.fromkeys(name for word in options.names for name in GROUPS.get(word, [word])))
+    for number, name in enumerate(names, 1):
+        module, function, _, duration = BENCHMARKS[name]
+        print(f"{name} ({number} of {len(names)}, {duration} where nothing is kept)", flush=True)
         start = time.monotonic()
         try:
             made = getattr(importlib.import_module(module), function)(bench)

@@ -49,6 +49,8 @@ const std::vector<Variant> kPaper{
     {"paper: signs of the map alone", true, {"temporal_field.learn_contrast=false"}, "paper"},
     {"paper: both polarities everywhere", true, {"registration.polarity=false"}, "paper"},
     {"paper: no buffer zone", true, {"registration.buffer_sigma=0"}, "paper"},
+    {"paper: no noise filter", true, {"events.noise_filter.on=false"}, "paper"},
+    {"paper: no early stage", true, {"events.noise_filter.on=false", "registration.polarity=false"}, "paper"},
     {"paper: eta 30 ms", true, {"temporal_field.eta_s=0.03"}, "paper"},
     {"paper: STPE alone", false, {"events.noise_filter.on=false", "registration.polarity=false"}, "paper"},
     {"paper: STPE and early stage", false, {}, "paper"},

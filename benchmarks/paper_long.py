@@ -3,7 +3,6 @@
 the last metre of landings, time by stage and system, processor and memory over time, the map's share of both."""
 import csv
 import dataclasses
-import json
 import pathlib
 import re
 import statistics
@@ -24,8 +23,9 @@ SYSTEMS = {"paper, graph": ("--preset", "paper"), "paper, EKF": ("--preset", "pa
 STAGES = ["choose", "events", "predict", "register", "fuse"]
 MOMENTS = (10, 25, 50, 75, 100)  # per cent of a run
 SAMPLE_S = 0.02
-MAP_SHARE = 50  # one in so many contours is left to see what the map takes
-NO_SEARCH = ("--set", "overlays=0", "--set", "relocalization.on=false", "--set", "fusion.calibration.on=false")
+FEW = 50  # one in so many contours is left to see what the map takes
+ALONE = ("--set", "overlays=0", "--set", "relocalization.on=false", "--set", "fusion.calibration.on=false")
+
 
 
 def flights(bench, scenario):
@@ -119,11 +119,11 @@ def status_of(process):
     return (int(memory[1]) / 1024, sum(map(int, ticks)) / 100) if memory else None
 
 
-def course(bench, flight, words):
+def course(bench, flight, contours, words):
     """Samples of memory and processor time over a run."""
     with bench.folder() as scratch:
-        command = [bench.evpose, "-q", "track", flight.folder, "--map", flight.contours, "--occluders", flight.mesh, "-o",
-                   scratch / "run", "--set", "overlays=0", "--set", "fusion.calibration.on=false", *words]
+        command = [bench.evpose, "-q", "track", flight.folder, "--map", contours, "--occluders", flight.mesh, "--init",
+                   "groundtruth", "-o", scratch / "run", *ALONE, *words]
         process = subprocess.Popen([str(w) for w in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         samples = []
         while process.poll() is None:
@@ -135,31 +135,27 @@ def course(bench, flight, words):
     return samples
 
 
-def map_memory(bench, flight, words):
-    """MB: peak with the map less the peak with a fiftieth of its contours."""
+def without_most(bench, flight, words):
+    """The same with a few of the contours."""
     with bench.folder() as scratch:
         ply = files.Ply(flight.contours)
-        ply.vertices = ply.vertices[ply.vertices["contour"] % MAP_SHARE == 0]
+        ply.vertices = ply.vertices[ply.vertices["contour"] % FEW == 0]
         ply.header = re.sub(rb"element vertex \d+", b"element vertex %d" % len(ply.vertices), ply.header)
         ply.write(scratch / "few.ply")
-        peaks = []
-        for contours in (flight.contours, scratch / "few.ply"):
-            bench.run("track", flight.folder, "--map", contours, "--init", "groundtruth", "-o", scratch / "run", "--force", *NO_SEARCH,
-                      *words)
-            peaks.append(json.loads((scratch / "run/summary.json").read_text())["resources"]["peak_memory_mb"])
-    return peaks[0], peaks[0] - peaks[1]
+        return course(bench, flight, scratch / "few.ply", words)
 
 
 def resources(bench):
     flight = next(flights(bench, "indoor_spiral"))
     rows = []
     for system in ("paper, graph", "defaults"):
-        samples = bench.once(f"paper long: course, {system}", lambda: course(bench, flight, SYSTEMS[system]))
-        peak, of_map = bench.once(f"paper long: memory, {system}", lambda: map_memory(bench, flight, SYSTEMS[system]))
-        at = [samples[min(len(samples) - 1, round(m / 100 * (len(samples) - 1)))] for m in MOMENTS]
+        whole = bench.once(f"paper long: course, {system}", lambda: course(bench, flight, flight.contours, SYSTEMS[system]))
+        few = bench.once(f"paper long: few contours, {system}", lambda: without_most(bench, flight, SYSTEMS[system]))
+        at = [whole[min(len(whole) - 1, round(m / 100 * (len(whole) - 1)))] for m in MOMENTS]
+        typical, less = (statistics.median(memory for memory, _ in samples) for samples in (whole, few))
         rows.append([system, *(f"{memory:.0f} MB, {seconds:.1f} s" for memory, seconds in at),
-                     f"{of_map:.0f} of {peak:.0f} MB"])
-    return tables.table(["system", *(f"{m} % of the run" for m in MOMENTS), "the map's share of the peak"], rows)
+                     f"{typical - less:.0f} of {typical:.0f} MB"])
+    return tables.table(["system", *(f"{m} % of the run" for m in MOMENTS), "the map's share of memory"], rows)
 
 
 def make(bench):

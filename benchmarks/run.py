@@ -26,7 +26,7 @@ BENCHMARKS = {
     "simulator": ("simulator", "make", "simulated flights", "2 h"),
     "unseen": ("experiments", "make_unseen", "flights that nobody has looked at, with all that may be wrong", "3 h"),
     "ablation": ("experiments", "make_ablation", "the tracker without one of its parts; its picture", "10 min"),
-    "paper": ("paper", "make", "from the paper's form to the defaults, one replacement at a time", "15 min"),
+    "paper": ("paper", "make", "from the paper's form to the defaults, one replacement at a time", "25 min"),
     "paper-flights": ("paper", "make_flights", "the same on six simulated flights: hard light, moving things", "5 min"),
     "paper-classes": ("paper", "make_classes", "the paper's form and the defaults by speed and turning", "15 min"),
     "paper-long": ("paper_long", "make", "flights of 10 s, three seeds: errors, time by stage, memory", "25 min"),

@@ -42,7 +42,6 @@ class RegionGrowing {
   RegionGrowing(const SurfacePoints& surface, const PlaneConfig& config)
       : surface_(surface),
         config_(config),
-        gate_m_(config.gate_sigma * surface.scale.noise_m),
         cos_(static_cast<float>(std::cos(config.angle_rad))),
         least_points_(std::max(kFewestPoints, config.least_patches * surface.scale.neighbours)),
         label_(surface.size(), -1) {}
@@ -61,12 +60,12 @@ class RegionGrowing {
   const std::uint32_t* links(std::uint32_t i) const {
     return &surface_.links[static_cast<std::size_t>(i) * SurfacePoints::kLinks];
   }
+  double gate_m(std::uint32_t i) const { return config_.gate_sigma * surface_.noise_at(i); }
   void grow(std::uint32_t seed);
   void renumber(const std::vector<std::int32_t>& part_of);
 
   const SurfacePoints& surface_;
   const PlaneConfig& config_;
-  double gate_m_;
   float cos_;
   double least_points_;
   std::vector<std::int32_t> label_;  ///< -2: tried and left as a seed
@@ -107,7 +106,7 @@ void RegionGrowing::grow(std::uint32_t seed) {
       if (label_[q] >= 0) continue;
       const Eigen::Vector3f& normal = surface_.normal[q];
       if (std::abs(normal.dot(plane.normal.cast<float>())) < cos_) continue;
-      if (std::abs(plane.distance(at(q))) > gate_m_) continue;
+      if (std::abs(plane.distance(at(q))) > gate_m(q)) continue;
       label_[q] = number;
       region_.push_back(q);
       moments.add(at(q));
@@ -131,7 +130,7 @@ void RegionGrowing::grow(std::uint32_t seed) {
   // Points that the region's first, rougher planes let in.
   Moments kept;
   for (const std::uint32_t i : region_) {
-    if (std::abs(plane.distance(at(i))) <= gate_m_)
+    if (std::abs(plane.distance(at(i))) <= gate_m(i))
       kept.add(at(i));
     else
       label_[i] = -1;
@@ -162,15 +161,15 @@ void RegionGrowing::dissolve_bends() {
           ++beside[static_cast<std::size_t>(other)];
       }
     if (beside.empty()) continue;
-    double sum = 0;
+    double sum = 0, allowed = 0;
     for (const std::uint32_t i : members[region]) {
       double least = INFINITY;
       for (const auto& [other, links_between] : beside)
         least = std::min(least, std::abs(planes[other].distance(at(i))));
       sum += least * least;
+      allowed += std::pow(kBendNoise * surface_.noise_at(i), 2);
     }
-    const double noise = kBendNoise * surface_.scale.noise_m;
-    if (sum > noise * noise * static_cast<double>(members[region].size())) continue;
+    if (sum > allowed) continue;
     dissolved[region] = true;
     for (const std::uint32_t i : members[region]) label_[i] = -1;
   }
@@ -307,7 +306,7 @@ Planes RegionGrowing::result() {
     const double n = moments_[p].count;
     // Neighbours share registration and calibration errors: a plane is never known better than a part of the
     // noise that many points cannot average away.
-    const double floor = std::pow(0.03 * surface_.scale.noise_m, 2);
+    const double floor = std::pow(0.03 * noise_on(surface_, plane), 2);
     plane.offset_variance = f.values[0] / n + floor;
     for (int k = 1; k < 3; ++k)
       plane.tilt_covariance += f.axes.col(k) * f.axes.col(k).transpose() * (f.values[0] / (n * f.values[k]));
@@ -332,7 +331,7 @@ void RegionGrowing::adopt_bends() {
     adopted.clear();
     for (std::uint32_t i = 0; i < label_.size(); ++i) {
       if (label_[i] >= 0) continue;
-      double nearest = gate_m_;
+      double nearest = gate_m(i);
       std::int32_t best = -1;
       for (int k = 0; k < SurfacePoints::kLinks; ++k) {
         const std::int32_t other = label_[links(i)[k]];

@@ -135,9 +135,11 @@ TEST(DepthSteps, AreTheDistanceOfTheNearestParallelLayer) {
               [](const auto& a, const auto& b) { return a.squaredNorm() < b.squaredNorm(); });
     return points;
   };
-  EXPECT_NEAR(depth_step_m(sorted(layers), 1e-5), 0.02, 1e-6);
-  EXPECT_EQ(depth_step_m(sorted(bend), 1e-5), 0);
-  EXPECT_EQ(depth_step_m({}, 1e-5), 0);
+  const DepthStep step = find_depth_step(sorted(layers), 1e-5);
+  EXPECT_NEAR(step.step_m, 0.02, 1e-6);
+  EXPECT_NEAR(std::abs(step.normal.z()), 1, 1e-6);
+  EXPECT_EQ(find_depth_step(sorted(bend), 1e-5).step_m, 0);
+  EXPECT_EQ(find_depth_step({}, 1e-5).step_m, 0);
 }
 
 }  // namespace

@@ -39,14 +39,14 @@ bool find_layer(std::span<const Eigen::Vector3d> around, double exact_m, Layer& 
 
 }  // namespace
 
-double depth_step_m(std::span<const Eigen::Vector3d> around, double exact_m) {
+DepthStep find_depth_step(std::span<const Eigen::Vector3d> around, double exact_m) {
   Layer layer;
-  if (!find_layer(around, exact_m, layer)) return 0;
+  if (!find_layer(around, exact_m, layer)) return {};
   const double apart_m = 10 * exact_m;  // the plane of a small layer may lean a little
   std::vector<double> off;
   for (const Eigen::Vector3d& x : around)
     if (const double d = layer.distance(x); std::abs(d) > apart_m) off.push_back(d);
-  if (off.size() < kFewestInLayer) return 0;
+  if (off.size() < kFewestInLayer) return {};
   std::sort(off.begin(), off.end());
   double nearest = INFINITY, levels = 0;
   for (std::size_t begin = 0, k = 1; k <= off.size(); ++k) {
@@ -57,7 +57,8 @@ double depth_step_m(std::span<const Eigen::Vector3d> around, double exact_m) {
     nearest = std::min(nearest, std::abs(sum / static_cast<double>(k - begin)));
     begin = k;
   }
-  return static_cast<double>(off.size()) >= kPointsPerLevel * levels ? nearest : 0;
+  if (static_cast<double>(off.size()) < kPointsPerLevel * levels) return {};
+  return {nearest, layer.normal};
 }
 
 }  // namespace evpose::map_build

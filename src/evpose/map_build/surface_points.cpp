@@ -22,6 +22,7 @@ constexpr double kFlat = 0.1;              // thickness^2 over width^2 of a patc
 constexpr std::size_t kFewest = 50;        // points of a cloud
 constexpr double kLeastNoise_m = 1e-5;     // of any sensor
 constexpr double kLayered = 0.1;           // share of patches without any thickness: depth may be rounded
+constexpr double kParallelLayers = 0.98;   // mean square of the cosine to their common normal
 constexpr std::size_t kNoisePlaces = 9;    // whose median is the local noise
 
 struct Shape {
@@ -52,6 +53,7 @@ void measure_steps(const std::vector<Eigen::Vector3f>& points, const Neighbours&
   std::vector<Eigen::Vector3d> around(patch);
   CloudScale told;
   double layered = 0, steps = 0;
+  Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Eigen::Vector3f& place = points[places[k]];
     double noise_m = noise[k];
@@ -59,8 +61,10 @@ void measure_steps(const std::vector<Eigen::Vector3f>& points, const Neighbours&
       layered += 1;
       const std::size_t found = tree.nearest(place, near, squares);
       for (std::size_t j = 0; j < found; ++j) around[j] = (points[near[j]] - place).cast<double>();
-      noise_m = depth_step_m(std::span(around).first(found), kLeastNoise_m) / std::sqrt(12.0);
-      if (noise_m <= 0) continue;
+      const DepthStep step = find_depth_step(std::span(around).first(found), kLeastNoise_m);
+      if (step.step_m <= 0) continue;
+      noise_m = step.step_m / std::sqrt(12.0);
+      normals += step.normal * step.normal.transpose();
       steps += 1;
     }
     told.noise_places.push_back(place);
@@ -68,6 +72,8 @@ void measure_steps(const std::vector<Eigen::Vector3f>& points, const Neighbours&
   }
   // Few may be parallel surfaces of a cloud that has no noise.
   if (layered < kLayered * static_cast<double>(places.size()) || steps < kLayered * layered) return;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(normals / steps);
+  if (axes.eigenvalues()[2] > kParallelLayers) told.layer_normal = axes.eigenvectors().col(2);
   scale = std::move(told);
   noise = scale.noise_there_m;
 }
@@ -103,6 +109,19 @@ class LayeredPatches {
     least_ = static_cast<std::size_t>(config.least);
     for (std::size_t i = 0; i < surface.size(); i += kThinned) some_.push_back(surface.position[i]);
     tree_.emplace(some_);
+    squeezed_.reserve(surface.size());
+    const CloudScale& scale = surface.scale;
+    const double share = std::min(1.0, scale.spacing_m / (std::sqrt(12.0) * scale.noise_m));
+    for (const Eigen::Vector3f& p : surface.position) {
+      const Eigen::Vector3d n = scale.layer_normal, x = p.cast<double>();
+      squeezed_.push_back((x - (1 - share) * n.dot(x) * n).cast<float>());
+    }
+    squeezed_tree_.emplace(squeezed_);
+  }
+
+  /// Nearest first, with the layers moved together: the next point of a surface may lie a step further on.
+  std::size_t neighbours(std::size_t i, std::span<std::uint32_t> near, std::span<float> squares) const {
+    return squeezed_tree_->nearest(squeezed_[i], near, squares);
   }
 
   /// Normal, curvature and spacing of point i; the buffers are scratch.
@@ -129,8 +148,8 @@ class LayeredPatches {
   static constexpr double kLayerNormal_rad = 0.1;
 
   std::size_t most_ = 0, least_ = 0;
-  std::vector<Eigen::Vector3f> some_;
-  std::optional<Neighbours> tree_;
+  std::vector<Eigen::Vector3f> some_, squeezed_;
+  std::optional<Neighbours> tree_, squeezed_tree_;
 };
 
 }  // namespace
@@ -218,13 +237,15 @@ SurfacePoints describe_surface(std::vector<Eigen::Vector3f>&& points, const Neig
     std::vector<float> squares(near.size());
     for (std::size_t i = begin; i < end; ++i) {
       // Most patches need no more than the typical number.
-      std::size_t found = tree.nearest(out.position[i], std::span(near).first(usual), squares);
+      const bool layers = !out.noise_m.empty();
+      std::size_t found = layers ? patches.neighbours(i, std::span(near).first(usual), squares)
+                                 : tree.nearest(out.position[i], std::span(near).first(usual), squares);
       std::uint32_t* links = &out.links[i * SurfacePoints::kLinks];
       int linked = 0;
       for (std::size_t k = 0; k < found && linked < SurfacePoints::kLinks; ++k)
         if (near[k] != i) links[linked++] = near[k];
       while (linked < SurfacePoints::kLinks) links[linked++] = static_cast<std::uint32_t>(i);
-      if (!out.noise_m.empty()) {
+      if (layers) {
         patches.describe(i, near, squares, out);
         continue;
       }

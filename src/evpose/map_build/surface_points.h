@@ -27,6 +27,8 @@ struct CloudScale {
   /// length over the root of 12). Empty: there are no layers.
   std::vector<Eigen::Vector3f> noise_places{};
   std::vector<double> noise_there_m{};
+  /// Of the layers, where they are parallel all over the cloud, as in a single depth image; else zero.
+  Eigen::Vector3d layer_normal = Eigen::Vector3d::Zero();
 
   bool layered() const { return !noise_places.empty(); }
 };

@@ -153,7 +153,10 @@ struct TileContents {
 /// Planes that bend or are a mixture of surfaces have no contours.
 std::vector<bool> unfit_for_contours(const TileContents& found, const PlaneConfig& config) {
   std::vector<bool> unfit = found.curved;
-  const double roughest_m = config.most_rough * typical_roughness(found.surface, found.planes);
+  double typical_m = typical_roughness(found.surface, found.planes);
+  // A single layer has no roughness; a surface of several has that of its steps.
+  if (found.surface.scale.layered()) typical_m = std::max(typical_m, found.surface.scale.noise_m);
+  const double roughest_m = config.most_rough * typical_m;
   for (std::size_t p = 0; p < unfit.size(); ++p)
     unfit[p] = unfit[p] || roughness(found.surface, found.planes.planes[p]) > roughest_m ||
                found.planes.planes[p].tilt_sigma_rad() > config.most_tilt_rad;

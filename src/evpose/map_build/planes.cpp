@@ -17,7 +17,7 @@ namespace {
 constexpr double kFewestPoints = 40;   // of a plane, however small the patches
 constexpr double kInnerShare = 0.2;    // of a plane's points, that lie away from other planes
 constexpr double kParallel = 0.98;     // cosine of the angle between two layers of a surface
-constexpr double kLayerSlack = 1.2;    // noise^2: of a layer about the plane through several
+constexpr double kLayerSlack = 4;      // noise^2: of a layer about the plane through several
 constexpr double kMostLean_rad = 0.5;  // of a layer from the surface it belongs to
 constexpr double kBendNoise = 1.2;     // rms distance from the planes beside it, in units of the noise
 

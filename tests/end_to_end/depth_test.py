@@ -185,5 +185,7 @@ class DepthTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    EVPOSE = sys.argv.pop(1)
-    unittest.main()
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    EVPOSE = sys.argv.pop()
+    unittest.main(verbosity=2)

@@ -9,12 +9,13 @@
 namespace evpose::map_build {
 namespace {
 
-constexpr double kStepSigma = 4;         // depths of neighbours that differ by more are a step,
-constexpr double kSteepest = 5.67;       // unless a surface seen at 80 degrees would differ as much
-constexpr double kLeastRayZ = 0.05;      // rays further from the axis tell no depth
-constexpr double kReachSigma = 2.5;      // along the ray: one surface
-constexpr double kTubeVoxels = 1.2;      // radius around the ray of what is averaged
-constexpr double kLargestReach = 40;     // voxels
+constexpr double kStepSigma = 4;      // depths of neighbours that differ by more are a step,
+constexpr double kSteepest = 5.67;    // unless a surface seen at 80 degrees would differ as much
+constexpr double kLeastRayZ = 0.05;   // rays further from the axis tell no depth
+constexpr double kReachSigma = 2.5;   // along the ray: one surface
+constexpr double kTubeVoxels = 0.75;  // radius around the ray of what is averaged
+constexpr double kChosen = 1.5;       // of the sigma: the heaviest voxel is where noise has put most points
+constexpr double kLargestReach = 40;  // voxels
 constexpr std::int64_t kBias = 1 << 20;  // cells from the origin, each way
 constexpr int kBits = 21;
 
@@ -194,7 +195,7 @@ MeasuredPoint DepthFusion::fused(std::uint64_t key, const Voxel& voxel) const {
   }
   MeasuredPoint out;
   out.position = start + middle_m * column.ray();
-  const double sigma_m = 1 / std::sqrt(std::max(weight, static_cast<double>(voxel.weight)));
+  const double sigma_m = kChosen / std::sqrt(std::max(weight, static_cast<double>(voxel.weight)));
   out.sigma_m = static_cast<float>(std::max(sigma_m, config_.noise.least_m));
   out.observations = static_cast<std::uint32_t>(std::min(count, 4e9));
   return out;

@@ -76,7 +76,7 @@ TEST(DepthFusion, PutsAWallWhereItIsWithinTheStatedSigma) {
       const auto count = static_cast<double>(points.size());
       EXPECT_LT(std::abs(sum / count), 0.1 * DepthNoise().sigma_m(distance_m))
           << distance_m << " m, " << images;
-      EXPECT_LT(std::sqrt(errors / count), 1.5) << distance_m << " m, " << images;
+      EXPECT_LT(std::sqrt(errors / count), 1.15) << distance_m << " m, " << images;
     }
 }
 

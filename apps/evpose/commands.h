@@ -27,6 +27,7 @@ void add_eval(CLI::App& app, std::function<int()>& run);
 void add_map(CLI::App& app, std::function<int()>& run);
 void add_map_build(CLI::App& map, std::function<int()>& run);
 void add_map_board(CLI::App& map, std::function<int()>& run);
+void add_map_depth(CLI::App& map, std::function<int()>& run);
 void add_map_merge(CLI::App& map, std::function<int()>& run);
 void add_map_compare(CLI::App& map, std::function<int()>& run);
 void add_map_changes(CLI::App& map, std::function<int()>& run);

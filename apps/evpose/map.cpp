@@ -108,6 +108,7 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   map->require_subcommand(1);
   add_map_build(*map, run);
   add_map_board(*map, run);
+  add_map_depth(*map, run);
   add_map_learn(*map, run);
   add_map_changes(*map, run);
   add_map_merge(*map, run);

@@ -29,6 +29,7 @@ BeyondEdge::BeyondEdge(const SurfacePoints& surface, const Neighbours& tree, con
       tree_(tree),
       plane_(plane),
       views_(views),
+      noise_m_(noise_on(surface, plane)),
       free_side_(side_of_the_rest(surface, plane)) {}
 
 bool BeyondEdge::surface_continues(const LineSegment& edge) const {
@@ -60,7 +61,7 @@ bool BeyondEdge::something_stands_before(const LineSegment& edge) const {
 
 bool BeyondEdge::hidden_from_views(const LineSegment& edge) const {
   constexpr int kProbes = 8;
-  const double margin_m = std::max({0.05, 3 * plane_.spacing_m, 5 * surface_.scale.noise_m});
+  const double margin_m = std::max({0.05, 3 * plane_.spacing_m, 5 * noise_m_});
   int hit = 0;
   for (int k = 0; k < kProbes; ++k)
     hit +=

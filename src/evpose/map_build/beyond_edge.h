@@ -33,7 +33,7 @@ class BeyondEdge {
   bool hidden_from_views(const LineSegment& edge) const;
 
   /// Radius of a probe: the plane has a point within it where it has a surface.
-  double reach_m() const { return std::max(2.5 * plane_.spacing_m, 2 * surface_.scale.noise_m); }
+  double reach_m() const { return std::max(2.5 * plane_.spacing_m, 2 * noise_m_); }
 
  private:
   /// A place beside the edge, at a share of its length, so far out of the surface.
@@ -45,6 +45,7 @@ class BeyondEdge {
   const Neighbours& tree_;
   const FittedPlane& plane_;
   std::span<const View> views_;
+  double noise_m_;    ///< of the plane's points
   double free_side_;  ///< of the plane: +1 or -1 where nearly everything else lies, 0 if there is none
 };
 

@@ -39,6 +39,7 @@ class BoundaryFinder {
         views_(input.views),
         plane_(input.planes.planes[number]),
         number_(static_cast<std::int32_t>(number)),
+        noise_m_(noise_on(input.surface, plane_)),
         outline_(input.outlines[number]),
         creases_(input.creases[number]),
         config_(config),
@@ -69,6 +70,7 @@ class BoundaryFinder {
   std::span<const View> views_;
   const FittedPlane& plane_;
   std::int32_t number_;
+  double noise_m_;  ///< of the plane's points
   const Outline& outline_;
   const std::vector<LineSegment>& creases_;
   const BoundaryConfig& config_;
@@ -79,7 +81,7 @@ class BoundaryFinder {
 /// Half or more of the side lies along segments that were found.
 bool BoundaryFinder::runs_along(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
                                 const std::vector<LineSegment>& segments) const {
-  const double reach = 1.5 * outline_.cell_m + 2 * surface_.scale.noise_m;
+  const double reach = 1.5 * outline_.cell_m + 2 * noise_m_;
   constexpr int kProbes = 8;
   int near = 0;
   for (int k = 0; k < kProbes; ++k) {
@@ -111,7 +113,7 @@ std::pair<Eigen::Vector2d, Eigen::Vector2d> BoundaryFinder::longest_part_without
 /// Of a second face too narrow for a plane of its own.
 std::optional<LineSegment> BoundaryFinder::far_edge(const LineSegment& near,
                                                     const EdgeProfileFit& profile) const {
-  const double noise = surface_.scale.noise_m;
+  const double noise = noise_m_;
   if (profile.side == 0 || !profile.ends || profile.sigma_depth > kMostDepthSigma * noise) return {};
   if (profile.depth < kLeastDepth * noise || profile.depth > kMostDepth * noise) return {};
   LineSegment far = near;
@@ -124,7 +126,7 @@ std::optional<LineSegment> BoundaryFinder::far_edge(const LineSegment& near,
 }
 
 double BoundaryFinder::sigma_m(const FittedEdge& fitted, const Eigen::Vector3d& at) const {
-  const double uneven = std::max(kUneven * surface_.scale.noise_m, plane_.uneven_m);
+  const double uneven = std::max(kUneven * noise_m_, plane_.uneven_m);
   const double off = std::hypot(plane_.sigma_at(at), uneven);
   return std::sqrt((fitted.across_m * fitted.across_m + fitted.moved_m * fitted.moved_m + off * off) / 2);
 }

@@ -101,6 +101,7 @@ struct Meeting {
   const FittedPlane& b;
   Line line;
   double sine = 0;       ///< of the angle between the planes
+  double noise_m = 0;    ///< of the points where they touch
   double gap_m = 0;      ///< nearer to the line a point may be of either plane
   double spacing_m = 0;  ///< median, of the points near the line
   double bin_m = 0;
@@ -168,7 +169,7 @@ bool plane_continues(const std::vector<Eigen::Vector3d>& points, const EdgeProfi
 /// of their boards go on.
 bool CreaseFinder::contradicted_by_profile(const LineSegment& segment) const {
   constexpr double kRightAngle = 0.94, kLeastFaceGain = 10, kMostSigmas = 3, kMostNoise = 0.5, kInPlane = 2.5;
-  const double noise = surface_.scale.noise_m;
+  const double noise = surface_.noise_near(tree_, 0.5 * (segment.begin + segment.end));
   if (segment.normal_a.cross(segment.normal_b).norm() < kRightAngle) return false;
   const Eigen::Vector3d along = segment.tangent(), middle = 0.5 * (segment.begin + segment.end);
   for (const auto& [number, out, other] : {std::tuple(segment.plane_a, segment.normal_a, segment.normal_b),
@@ -199,7 +200,8 @@ std::optional<Meeting> CreaseFinder::meeting_of(const PlanePair& pair, const Con
   // Narrow strips that turn a little are as likely facets of a rounded body as faces with an edge between
   // them.
   if (out.sine < kFacetSin && std::max(out.width_a_m, out.width_b_m) < kFacetWidth_m) return {};
-  out.gap_m = kAmbiguous * surface_.scale.noise_m / std::max(out.sine, 0.3);
+  out.noise_m = surface_.noise_near(tree_, contact.sum / contact.count);
+  out.gap_m = kAmbiguous * out.noise_m / std::max(out.sine, 0.3);
   const double widest = kBinSpacings * std::max(a.spacing_m, b.spacing_m) * 2 + out.gap_m;
   out.near_a = near_line(surface_, a, out.line, widest);
   out.near_b = near_line(surface_, b, out.line, widest);
@@ -234,9 +236,8 @@ std::vector<CreaseFinder::Stretch> CreaseFinder::stretches_of(const Meeting& m,
     }
     double t0 = first * m.bin_m, t1 = (last + 1) * m.bin_m;
     if (t1 - t0 < std::max(config_.least_length_m, 2 * m.bin_m) || held < 2) continue;
-    const double noise = surface_.scale.noise_m;
-    if (!reaches_line(m.near_a, t0, t1, sides_a > 0 ? 1 : -1, m.gap_m, m.bin_m, noise) ||
-        !reaches_line(m.near_b, t0, t1, sides_b > 0 ? 1 : -1, m.gap_m, m.bin_m, noise))
+    if (!reaches_line(m.near_a, t0, t1, sides_a > 0 ? 1 : -1, m.gap_m, m.bin_m, m.noise_m) ||
+        !reaches_line(m.near_b, t0, t1, sides_b > 0 ? 1 : -1, m.gap_m, m.bin_m, m.noise_m))
       continue;
     const double reach_m = m.bin_m + m.gap_m;
     t0 = snapped_to_third_plane(m.line, t0, reach_m, m.pair, thirds);
@@ -253,12 +254,11 @@ std::vector<CreaseFinder::Stretch> CreaseFinder::stretches_of(const Meeting& m,
 LineSegment CreaseFinder::fit_segment(const Meeting& m, const Stretch& stretch) const {
   const auto& [t0, t1, out_a, out_b] = stretch;
   const Eigen::Vector3d begin = m.line.at(t0), end = m.line.at(t1);
+  const double noise = surface_.noise_near(tree_, 0.5 * (begin + end));
   const std::vector<Eigen::Vector3d> around =
-      points_around(surface_, tree_, begin, end, strip_reach_m(surface_.scale.noise_m, m.sine, m.spacing_m));
-  const StripFit strip_a =
-      fit_strip(around, {begin, end, -out_a, m.a, m.b, m.sine, m.spacing_m}, surface_.scale.noise_m);
-  const StripFit strip_b =
-      fit_strip(around, {begin, end, -out_b, m.b, m.a, m.sine, m.spacing_m}, surface_.scale.noise_m);
+      points_around(surface_, tree_, begin, end, strip_reach_m(noise, m.sine, m.spacing_m));
+  const StripFit strip_a = fit_strip(around, {begin, end, -out_a, m.a, m.b, m.sine, m.spacing_m}, noise);
+  const StripFit strip_b = fit_strip(around, {begin, end, -out_b, m.b, m.a, m.sine, m.spacing_m}, noise);
   LineSegment segment;
   segment.kind = ContourKind::crease;
   segment.plane_a = m.pair.first;
@@ -278,7 +278,7 @@ LineSegment CreaseFinder::fit_segment(const Meeting& m, const Stretch& stretch) 
   segment.normal_b = out_b;
   // Near its borders a face's points mix with those of its neighbours: the narrower it is, the more they draw
   // it.
-  const double noise = surface_.scale.noise_m, mixed = kMixed * noise * noise;
+  const double mixed = kMixed * noise * noise;
   const auto sigma_of = [&](const StripFit& strip, double width_m) {
     return std::hypot(strip.sigma_m, mixed / std::max(width_m, noise));
   };
@@ -292,7 +292,7 @@ std::vector<LineSegment> CreaseFinder::segments_of(const PlanePair& pair, const 
   const std::optional<Meeting> meeting = meeting_of(pair, contact);
   if (!meeting) return {};
   const auto reach_on = [&](const FittedPlane& plane) {
-    return std::max(2.5 * plane.spacing_m, 2 * surface_.scale.noise_m);
+    return std::max(2.5 * plane.spacing_m, 2 * meeting->noise_m);
   };
   std::vector<LineSegment> out;
   for (const Stretch& stretch : stretches_of(*meeting, thirds)) {

@@ -62,7 +62,9 @@ std::vector<bool> find_curved(const SurfacePoints& surface, const Planes& planes
     // The curvature's own error: that of a parabola over a strip, 12 sqrt(5) noise / (sqrt(n) w^2).
     const double sigma_turn =
         12 * std::sqrt(5.0) * plane.rms_m / (std::sqrt(static_cast<double>(plane.points.size())) * width);
-    out[p] = turn > 0.2 && turn > 4 * sigma_turn;
+    // What is seen in steps of depth must rise by one: that of uniform errors is their sigma times 12^0.5.
+    const double least_rise_m = surface.noise_m.empty() ? 0 : std::sqrt(12.0) * noise_on(surface, plane);
+    out[p] = turn > 0.2 && turn > 4 * sigma_turn && turn * width / 8 > least_rise_m;
   }
   mark_facets(surface, planes, out);
   return out;

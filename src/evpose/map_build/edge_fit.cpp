@@ -66,7 +66,8 @@ EdgeFitter::EdgeFitter(const SurfacePoints& surface, const Neighbours& tree, con
       plane_(plane),
       frame_(plane),
       cell_m_(cell_m),
-      most_blur_noise_(most_blur_noise) {}
+      most_blur_noise_(most_blur_noise),
+      noise_m_(noise_on(surface, plane)) {}
 
 /// All points of the cloud near an edge in its coordinates: along it, outwards, over the plane.
 std::vector<Eigen::Vector3d> EdgeFitter::local_points(const Edge& edge, double reach) const {
@@ -98,7 +99,7 @@ std::vector<Eigen::Vector3d> EdgeFitter::local_points(const Edge& edge, double r
 /// the points too high for most of the plane's: they stand at the edge in excess, on that side only.
 EdgeFitter::OwnPoints EdgeFitter::own_points(const std::vector<Eigen::Vector3d>& local,
                                              double half_width) const {
-  const double noise = surface_.scale.noise_m;
+  const double noise = noise_m_;
   OwnPoints out;
   std::vector<Eigen::Vector3d> half[2];
   double at_edge[2] = {0, 0}, within[2] = {0, 0};
@@ -150,7 +151,7 @@ StepFit EdgeFitter::likeliest(const std::vector<Eigen::Vector3d>& points, double
 /// The second face that begins at the edge, and where that puts it; `side` is 0 if there is none. Nothing if
 /// there is something that is no face, or more than faces: what ends where is open.
 std::optional<EdgeProfileFit> EdgeFitter::second_face(const Edge& edge) const {
-  const double noise = surface_.scale.noise_m;
+  const double noise = noise_m_;
   const EdgeProfileWindow window =
       edge_profile_window(edge.half_length, noise, plane_.rms_m, plane_.spacing_m);
   const EdgeProfileFit profile =
@@ -164,7 +165,7 @@ std::optional<EdgeProfileFit> EdgeFitter::second_face(const Edge& edge) const {
 
 /// Moves the edge to where the plane's density falls off.
 StepFit EdgeFitter::move_to_density_step(Edge& edge) const {
-  const double noise = surface_.scale.noise_m, half_width = 2.5 * cell_m_;
+  const double noise = noise_m_, half_width = 2.5 * cell_m_;
   const double softest = std::max(noise, 0.3 * plane_.spacing_m);
   StepFit best;
   for (int round = 0; round < 2; ++round) {
@@ -188,7 +189,7 @@ StepFit EdgeFitter::move_to_density_step(Edge& edge) const {
 FittedEdge EdgeFitter::fit(const Edge& edge) const {
   FittedEdge out;
   out.edge = edge;
-  const double noise = surface_.scale.noise_m;
+  const double noise = noise_m_;
   const StepFit best = move_to_density_step(out.edge);
   if (!best.converged) return out;
   if (best.blur_m > most_blur_noise_ * std::max(noise, 0.3 * plane_.spacing_m)) {

@@ -68,6 +68,7 @@ class EdgeFitter {
   const FittedPlane& plane_;
   PlaneFrame frame_;
   double cell_m_, most_blur_noise_;
+  double noise_m_;  ///< of the plane's points
 };
 
 }  // namespace evpose::map_build

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "evpose/map_build/median.h"
 #include "evpose/map_build/surface_points.h"
 
 namespace evpose::map_build {
@@ -20,6 +21,15 @@ double FittedPlane::sigma_at(const Eigen::Vector3d& x) const {
 double FittedPlane::tilt_sigma_rad() const {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tilt_covariance, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(solver.eigenvalues()[2], 0.0));
+}
+
+double noise_on(const SurfacePoints& surface, const FittedPlane& plane) {
+  if (surface.noise_m.empty() || plane.points.empty()) return surface.scale.noise_m;
+  std::vector<double> noise;
+  const std::size_t step = std::max<std::size_t>(1, plane.points.size() / 1000);
+  for (std::size_t i = 0; i < plane.points.size(); i += step)
+    noise.push_back(surface.noise_at(plane.points[i]));
+  return median(noise);
 }
 
 double unevenness_m(const SurfacePoints& surface, const FittedPlane& plane) {

@@ -32,4 +32,7 @@ struct FittedPlane {
 /// What the means of cells of a plane scatter beyond what their points' noise explains, 1 sigma.
 double unevenness_m(const SurfacePoints& surface, const FittedPlane& plane);
 
+/// The median noise of its points; that of the cloud where there is no local one.
+double noise_on(const SurfacePoints& surface, const FittedPlane& plane);
+
 }  // namespace evpose::map_build

@@ -79,12 +79,17 @@ LineSegment axis_of(const Cylinder& cylinder) {
   return out;
 }
 
-/// Rms of the plane that half of the points lie on smoother planes than.
-double typical_roughness(const Planes& planes) {
+/// Rms of a plane if its noise were the cloud's.
+double roughness(const SurfacePoints& surface, const FittedPlane& plane) {
+  return plane.rms_m * (surface.scale.noise_m / noise_on(surface, plane));
+}
+
+/// Roughness of the plane that half of the points lie on smoother planes than.
+double typical_roughness(const SurfacePoints& surface, const Planes& planes) {
   std::vector<std::pair<double, std::size_t>> by_roughness;
   std::size_t all = 0, so_far = 0;
   for (const FittedPlane& plane : planes.planes) {
-    by_roughness.emplace_back(plane.rms_m, plane.points.size());
+    by_roughness.emplace_back(roughness(surface, plane), plane.points.size());
     all += plane.points.size();
   }
   std::sort(by_roughness.begin(), by_roughness.end());
@@ -148,9 +153,12 @@ struct TileContents {
 /// Planes that bend or are a mixture of surfaces have no contours.
 std::vector<bool> unfit_for_contours(const TileContents& found, const PlaneConfig& config) {
   std::vector<bool> unfit = found.curved;
-  const double roughest_m = config.most_rough * typical_roughness(found.planes);
+  double typical_m = typical_roughness(found.surface, found.planes);
+  // A single layer has no roughness; a surface of several has that of its steps.
+  if (found.surface.scale.layered()) typical_m = std::max(typical_m, found.surface.scale.noise_m);
+  const double roughest_m = config.most_rough * typical_m;
   for (std::size_t p = 0; p < unfit.size(); ++p)
-    unfit[p] = unfit[p] || found.planes.planes[p].rms_m > roughest_m ||
+    unfit[p] = unfit[p] || roughness(found.surface, found.planes.planes[p]) > roughest_m ||
                found.planes.planes[p].tilt_sigma_rad() > config.most_tilt_rad;
   return unfit;
 }

@@ -14,10 +14,12 @@
 namespace evpose::map_build {
 namespace {
 
-constexpr double kFewestPoints = 40;  // of a plane, however small the patches
-constexpr double kInnerShare = 0.2;   // of a plane's points, that lie away from other planes
-constexpr double kParallel = 0.98;    // cosine of the angle between two layers of a surface
-constexpr double kBendNoise = 1.2;    // rms distance from the planes beside it, in units of the noise
+constexpr double kFewestPoints = 40;   // of a plane, however small the patches
+constexpr double kInnerShare = 0.2;    // of a plane's points, that lie away from other planes
+constexpr double kParallel = 0.98;     // cosine of the angle between two layers of a surface
+constexpr double kLayerSlack = 4;      // noise^2: of a layer about the plane through several
+constexpr double kMostLean_rad = 0.5;  // of a layer from the surface it belongs to
+constexpr double kBendNoise = 1.2;     // rms distance from the planes beside it, in units of the noise
 
 struct Fit {
   Eigen::Vector3d centre, normal;
@@ -42,7 +44,6 @@ class RegionGrowing {
   RegionGrowing(const SurfacePoints& surface, const PlaneConfig& config)
       : surface_(surface),
         config_(config),
-        gate_m_(config.gate_sigma * surface.scale.noise_m),
         cos_(static_cast<float>(std::cos(config.angle_rad))),
         least_points_(std::max(kFewestPoints, config.least_patches * surface.scale.neighbours)),
         label_(surface.size(), -1) {}
@@ -61,12 +62,13 @@ class RegionGrowing {
   const std::uint32_t* links(std::uint32_t i) const {
     return &surface_.links[static_cast<std::size_t>(i) * SurfacePoints::kLinks];
   }
+  double gate_m(std::uint32_t i) const { return config_.gate_sigma * surface_.noise_at(i); }
   void grow(std::uint32_t seed);
+  std::vector<double> noise_of_regions() const;
   void renumber(const std::vector<std::int32_t>& part_of);
 
   const SurfacePoints& surface_;
   const PlaneConfig& config_;
-  double gate_m_;
   float cos_;
   double least_points_;
   std::vector<std::int32_t> label_;  ///< -2: tried and left as a seed
@@ -107,7 +109,7 @@ void RegionGrowing::grow(std::uint32_t seed) {
       if (label_[q] >= 0) continue;
       const Eigen::Vector3f& normal = surface_.normal[q];
       if (std::abs(normal.dot(plane.normal.cast<float>())) < cos_) continue;
-      if (std::abs(plane.distance(at(q))) > gate_m_) continue;
+      if (std::abs(plane.distance(at(q))) > gate_m(q)) continue;
       label_[q] = number;
       region_.push_back(q);
       moments.add(at(q));
@@ -131,7 +133,7 @@ void RegionGrowing::grow(std::uint32_t seed) {
   // Points that the region's first, rougher planes let in.
   Moments kept;
   for (const std::uint32_t i : region_) {
-    if (std::abs(plane.distance(at(i))) <= gate_m_)
+    if (std::abs(plane.distance(at(i))) <= gate_m(i))
       kept.add(at(i));
     else
       label_[i] = -1;
@@ -162,15 +164,15 @@ void RegionGrowing::dissolve_bends() {
           ++beside[static_cast<std::size_t>(other)];
       }
     if (beside.empty()) continue;
-    double sum = 0;
+    double sum = 0, allowed = 0;
     for (const std::uint32_t i : members[region]) {
       double least = INFINITY;
       for (const auto& [other, links_between] : beside)
         least = std::min(least, std::abs(planes[other].distance(at(i))));
       sum += least * least;
+      allowed += std::pow(kBendNoise * surface_.noise_at(i), 2);
     }
-    const double noise = kBendNoise * surface_.scale.noise_m;
-    if (sum > noise * noise * static_cast<double>(members[region].size())) continue;
+    if (sum > allowed) continue;
     dissolved[region] = true;
     for (const std::uint32_t i : members[region]) label_[i] = -1;
   }
@@ -204,6 +206,7 @@ void RegionGrowing::merge_coplanar() {
     while (parent[static_cast<std::size_t>(a)] != a) a = parent[static_cast<std::size_t>(a)];
     return a;
   };
+  const std::vector<double> noise = noise_of_regions();
   std::map<std::pair<std::int32_t, std::int32_t>, int> touching;
   for (std::uint32_t i = 0; i < label_.size(); ++i) {
     if (label_[i] < 0) continue;
@@ -224,15 +227,21 @@ void RegionGrowing::merge_coplanar() {
     Moments both = ma;
     both.add(mb);
     const Fit fab = fit(both);
-    // Each part must lie in the joint plane as well as in its own, but for a fraction of the noise.
-    const double slack = 0.25 * surface_.scale.noise_m * surface_.scale.noise_m;
+    // Each part must lie in the joint plane as well as in its own, but for a fraction of the noise; a layer
+    // of a surface seen in steps lies in its own plane without any, and may lean by a step over its width.
+    const bool layers = !surface_.noise_m.empty();
+    const double noise_m = std::max(noise[static_cast<std::size_t>(a)], noise[static_cast<std::size_t>(b)]);
+    const double slack = (layers ? kLayerSlack : 0.25) * noise_m * noise_m;
+    const double lean_rad =
+        layers ? noise_m / std::sqrt(fa.values[1]) + noise_m / std::sqrt(fb.values[1]) : 0;
     const auto thickness = [&](const Moments& m) {
       const double off = fab.distance(m.mean());
       return fab.normal.dot(m.covariance() * fab.normal) + off * off;
     };
     const double angle_cos = std::abs(fa.normal.dot(fb.normal));
     const bool small = std::min(ma.count, mb.count) < 4 * least_points_;
-    if (angle_cos < std::cos(small ? 4 * config_.merge_rad : config_.merge_rad)) continue;
+    const double merge_rad = (small ? 4 * config_.merge_rad : config_.merge_rad) + lean_rad;
+    if (angle_cos < std::cos(std::min(merge_rad, kMostLean_rad))) continue;
     if (thickness(ma) > fa.values[0] + slack || thickness(mb) > fb.values[0] + slack) continue;
     ma = both;
     parent[static_cast<std::size_t>(b)] = a;
@@ -264,7 +273,21 @@ void RegionGrowing::relabel_to_nearest() {
   label_ = std::move(nearest);
 }
 
+/// Mean over each region's points.
+std::vector<double> RegionGrowing::noise_of_regions() const {
+  if (surface_.noise_m.empty()) return std::vector<double>(moments_.size(), surface_.scale.noise_m);
+  std::vector<double> sum(moments_.size(), 0), count(moments_.size(), 0);
+  for (std::uint32_t i = 0; i < label_.size(); ++i)
+    if (label_[i] >= 0) {
+      sum[static_cast<std::size_t>(label_[i])] += surface_.noise_at(i);
+      count[static_cast<std::size_t>(label_[i])] += 1;
+    }
+  for (std::size_t r = 0; r < sum.size(); ++r) sum[r] /= std::max(count[r], 1.0);
+  return sum;
+}
+
 void RegionGrowing::split_layers() {
+  if (!surface_.noise_m.empty()) return;  // steps of depth make layers of any surface
   const std::int32_t count =
       split_layered_planes(surface_, least_points_, static_cast<std::int32_t>(moments_.size()), label_);
   moments_.assign(static_cast<std::size_t>(count), {});
@@ -307,7 +330,7 @@ Planes RegionGrowing::result() {
     const double n = moments_[p].count;
     // Neighbours share registration and calibration errors: a plane is never known better than a part of the
     // noise that many points cannot average away.
-    const double floor = std::pow(0.03 * surface_.scale.noise_m, 2);
+    const double floor = std::pow(0.03 * noise_on(surface_, plane), 2);
     plane.offset_variance = f.values[0] / n + floor;
     for (int k = 1; k < 3; ++k)
       plane.tilt_covariance += f.axes.col(k) * f.axes.col(k).transpose() * (f.values[0] / (n * f.values[k]));
@@ -332,7 +355,7 @@ void RegionGrowing::adopt_bends() {
     adopted.clear();
     for (std::uint32_t i = 0; i < label_.size(); ++i) {
       if (label_[i] >= 0) continue;
-      double nearest = gate_m_;
+      double nearest = gate_m(i);
       std::int32_t best = -1;
       for (int k = 0; k < SurfacePoints::kLinks; ++k) {
         const std::int32_t other = label_[links(i)[k]];

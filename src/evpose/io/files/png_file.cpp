@@ -3,6 +3,7 @@
 
 #include <png.h>
 
+#include <bit>
 #include <csetjmp>
 #include <cstring>
 #include <unordered_map>
@@ -111,8 +112,18 @@ void make_grey8(png_structp png, png_infop info) {
 
 constexpr png_uint_32 kMostAlongSide = 16'384;
 
-/// False for what is no sound PNG. `rows` is the caller's, since a fault leaves by a long jump.
-bool decode_grey8(Bytes bytes, GreyImage& image, std::vector<png_bytep>& rows) {
+/// A grey picture to be read, of one byte a pixel or of two.
+struct GreyTarget {
+  int bytes_per_pixel = 1;
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> bytes{};  ///< row by row; two of a pixel in the order of this machine
+  std::vector<png_bytep> rows{};
+  bool other_kind = false;  ///< not of one channel of 16 bits, where two bytes a pixel are wanted
+};
+
+/// False for what is no sound PNG, or one of another kind. `target` is the caller's, since a fault leaves by
+/// a long jump.
+bool decode_grey(Bytes bytes, GreyTarget& target) {
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, give_up, say_nothing);
   png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
   if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
@@ -126,15 +137,25 @@ bool decode_grey8(Bytes bytes, GreyImage& image, std::vector<png_bytep>& rows) {
 #endif
   png_set_read_fn(png, &bytes, take);
   png_read_info(png, info);
-  make_grey8(png, info);
-  image.width = static_cast<int>(png_get_image_width(png, info));
-  image.height = static_cast<int>(png_get_image_height(png, info));
-  const auto width = static_cast<std::size_t>(image.width);
-  if (png_get_rowbytes(png, info) != width) png_error(png, "not grey");
-  image.pixels.resize(width * static_cast<std::size_t>(image.height));
-  for (std::size_t y = 0; y < static_cast<std::size_t>(image.height); ++y)
-    rows.push_back(image.pixels.data() + y * width);
-  png_read_image(png, rows.data());
+  if (target.bytes_per_pixel == 1) {
+    make_grey8(png, info);
+  } else {
+    target.other_kind =
+        png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16;
+    if (target.other_kind) png_error(png, "no 16-bit grey");
+    if (std::endian::native == std::endian::little) png_set_swap(png);
+    png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+  }
+  target.width = static_cast<int>(png_get_image_width(png, info));
+  target.height = static_cast<int>(png_get_image_height(png, info));
+  const std::size_t row_bytes =
+      static_cast<std::size_t>(target.width) * static_cast<std::size_t>(target.bytes_per_pixel);
+  if (png_get_rowbytes(png, info) != row_bytes) png_error(png, "not grey");
+  target.bytes.resize(row_bytes * static_cast<std::size_t>(target.height));
+  for (std::size_t y = 0; y < static_cast<std::size_t>(target.height); ++y)
+    target.rows.push_back(target.bytes.data() + y * row_bytes);
+  png_read_image(png, target.rows.data());
   png_destroy_read_struct(&png, &info, nullptr);
   return true;
 }
@@ -181,14 +202,32 @@ Status write_png_grey16(const std::string& path, int width, int height,
                            .bytes = reinterpret_cast<const std::uint8_t*>(pixels.data())});
 }
 
-Expected<GreyImage> read_png_grey8(const std::string& path) {
+namespace {
+
+Expected<GreyTarget> read_grey(const std::string& path, int bytes_per_pixel) {
   constexpr std::size_t kMostBytes = 256 << 20;
   const auto bytes = first_bytes(path, kMostBytes);
   if (!bytes) return bytes.error();
-  GreyImage image;
-  std::vector<png_bytep> rows;
-  if (!fits(*bytes) || !decode_grey8({bytes->data(), bytes->size()}, image, rows))
-    return Error{path, "is no PNG picture, or a damaged one", "convert it to PNG, or copy it again"};
+  GreyTarget target{.bytes_per_pixel = bytes_per_pixel};
+  if (fits(*bytes) && decode_grey({bytes->data(), bytes->size()}, target)) return target;
+  if (target.other_kind)
+    return Error{path, "is no PNG of one channel of 16 bits", "write depth as 16-bit grey levels"};
+  return Error{path, "is no PNG picture, or a damaged one", "convert it to PNG, or copy it again"};
+}
+
+}  // namespace
+
+Expected<GreyImage> read_png_grey8(const std::string& path) {
+  auto read = read_grey(path, 1);
+  if (!read) return read.error();
+  return GreyImage{read->width, read->height, std::move(read->bytes)};
+}
+
+Expected<Grey16Image> read_png_grey16(const std::string& path) {
+  const auto read = read_grey(path, 2);
+  if (!read) return read.error();
+  Grey16Image image{read->width, read->height, std::vector<std::uint16_t>(read->bytes.size() / 2)};
+  std::memcpy(image.pixels.data(), read->bytes.data(), read->bytes.size());
   return image;
 }
 

@@ -43,4 +43,13 @@ struct GreyImage {
 /// open_to_read(), no PNG or a damaged one, more than 16,384 pixels along a side.
 Expected<GreyImage> read_png_grey8(const std::string& path);
 
+struct Grey16Image {
+  int width = 0, height = 0;
+  std::vector<std::uint16_t> pixels;  ///< row by row, from the top
+};
+
+/// A PNG of one channel of 16 bits, its numbers as they stand, as depth images have them. Errors: any other
+/// PNG, which has no such numbers; those of read_png_grey8().
+Expected<Grey16Image> read_png_grey16(const std::string& path);
+
 }  // namespace evpose

@@ -245,6 +245,23 @@ Status write_ply_cloud(const std::string& path, const std::vector<CloudPoint>& p
   return file->commit();
 }
 
+Status write_ply_measured(const std::string& path, const std::vector<MeasuredPoint>& points) {
+  auto file = AtomicFile::create(path);
+  if (!file) return file.error();
+  file->write(header("cloud, map frame, metres; sigma along the line of sight", points.size()) +
+              properties("double", {"x", "y", "z"}) + properties("float", {"sigma"}) +
+              properties("uint", {"observations"}) + "end_header\n");
+  std::string row;
+  for (const MeasuredPoint& point : points) {
+    row.clear();
+    put(row, point.position);
+    put(row, point.sigma_m);
+    put(row, point.observations);
+    file->write(row);
+  }
+  return file->commit();
+}
+
 Status write_ply_points(const std::string& path, const std::vector<Eigen::Vector3d>& points) {
   auto file = AtomicFile::create(path);
   if (!file) return file.error();

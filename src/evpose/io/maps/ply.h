@@ -9,6 +9,7 @@
 #include "evpose/core/error.h"
 #include "evpose/io/maps/point_table.h"
 #include "evpose/map/contour_map.h"
+#include "evpose/map/measured_point.h"
 
 namespace evpose {
 
@@ -42,6 +43,9 @@ struct CloudPoint {
 };
 /// x y z as floats, intensity, scan.
 Status write_ply_cloud(const std::string& path, const std::vector<CloudPoint>& points);
+
+/// x y z as doubles, sigma and observations.
+Status write_ply_measured(const std::string& path, const std::vector<MeasuredPoint>& points);
 
 /// x y z as floats.
 Status write_ply_points(const std::string& path, const std::vector<Eigen::Vector3d>& points);

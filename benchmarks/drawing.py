@@ -80,25 +80,34 @@ def predicted(way, left, up, corner):
 
 
 def read_grey_png(path):
-    """An 8-bit grey PNG, as the simulator writes them."""
+    """A grey PNG of 8 or 16 bits, as the simulator writes them."""
     data = path.read_bytes()
-    at, packed, width, height = 8, b"", 0, 0
+    at, packed, width, height, step = 8, b"", 0, 0, 1
     while at < len(data):
         size, kind = struct.unpack(">I4s", data[at:at + 8])
         body = data[at + 8:at + 8 + size]
         if kind == b"IHDR":
-            width, height = struct.unpack(">II", body[:8])
+            width, height, step = *struct.unpack(">II", body[:8]), body[8] // 8
         if kind == b"IDAT":
             packed += body
         at += size + 12
-    raw = zlib.decompress(packed)
-    rows, above = [], [0] * width
+    raw, size = zlib.decompress(packed), step * width
+    rows, above = [], [0] * size
     for y in range(height):
-        line = raw[y * (width + 1):(y + 1) * (width + 1)]
-        way, row, left, corner = line[0], list(line[1:]), 0, 0
-        for x in range(width):
-            left = row[x] = (row[x] + predicted(way, left, above[x], corner)) & 255
-            corner = above[x]
+        line = raw[y * (size + 1):(y + 1) * (size + 1)]
+        way, row = line[0], list(line[1:])
+        for x in range(size):
+            left, corner = (row[x - step], above[x - step]) if x >= step else (0, 0)
+            row[x] = (row[x] + predicted(way, left, above[x], corner)) & 255
         rows.append(row)
         above = row
-    return np.array(rows, np.uint8)
+    image = np.array(rows, np.uint8)
+    return image if step == 1 else image.view(">u2").astype(np.uint16)
+
+
+def write_grey_png(path, image):
+    """An image of height x width, of 8 or 16 bits."""
+    height, width = image.shape
+    rows = image.astype(">u2").view(np.uint8) if image.dtype == np.uint16 else image
+    path.write_bytes(png_head(width, height, 8 * image.dtype.itemsize, 0) + png_chunk(b"IDAT", png_rows(rows)) +
+                     png_chunk(b"IEND", b""))

@@ -152,6 +152,12 @@ class Files(BenchTest):
                                           drawing.png_chunk(b"IEND", b""))
         np.testing.assert_array_equal(drawing.read_grey_png(self.root / "a.png"), image)
 
+    def test_what_is_written_as_a_grey_png_is_read_back(self):
+        for kind in (np.uint8, np.uint16):
+            image = np.random.default_rng(4).integers(0, np.iinfo(kind).max, (5, 7), kind)
+            drawing.write_grey_png(self.root / "b.png", image)
+            np.testing.assert_array_equal(drawing.read_grey_png(self.root / "b.png"), image)
+
     def test_chunks_of_a_png_carry_length_and_checksum(self):
         chunk = drawing.png_chunk(b"IEND", b"")
         self.assertEqual(chunk, struct.pack(">I", 0) + b"IEND" + bytes.fromhex("ae426082"))

@@ -66,12 +66,17 @@ def measure(bench, flight, system):
     return bench.once(f"paper long: {flight.name}, {system}", lambda: tracked(bench, flight, SYSTEMS[system]))
 
 
+def digits(value, count):
+    return np.format_float_positional(float(f"{value:.{count}g}"), trim="-")
+
+
 def spread(values):
     """Mean, and the standard deviation between the seeds."""
     values = [v for v in values if v is not None]
     if not values:
         return "-"
-    return f"{statistics.mean(values):.3g} ± {statistics.stdev(values) if len(values) > 1 else 0:.2g}"
+    apart = statistics.stdev(values) if len(values) > 1 else 0
+    return f"{digits(statistics.mean(values), 3)} ± {digits(apart, 2)}"
 
 
 def errors(bench):

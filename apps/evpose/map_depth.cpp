@@ -30,7 +30,7 @@ struct DepthRequest {
   std::vector<double> T_body_cam;  ///< x, y, z, qx, qy, qz, qw
   double voxel_m = 0.01, range_m = 5, max_gap_s = 0.2;
   int camera = -1, threads = 1;
-  bool imu_poses = false, every_voxel = false;
+  bool imu_poses = false;
 };
 
 /// An image and where it was taken.
@@ -84,16 +84,17 @@ Expected<map_build::DepthFusionConfig> config_of(const DepthRequest& request) {
   config.noise.step_m = 1 / request.units_per_m;
   if (!request.noise.empty()) {
     if (request.noise.size() != 2 || !(request.noise[0] >= 0 && request.noise[1] >= 0) ||
-        request.noise[0] + request.noise[1] <= 0)
+        !(request.noise[0] + request.noise[1] > 0 && request.noise[0] + request.noise[1] <= 1))
       return Error{"--noise", "is no error of depth", "give A,B of A + B z^2, in metres, e.g. 0.0015,0.0025"};
     config.noise.least_m = request.noise[0], config.noise.growth_per_m = request.noise[1];
   }
   if (!(request.voxel_m >= 0.001 && request.voxel_m <= 1))
     return Error{"--voxel", text(request.voxel_m, " m is no size of a voxel"), "give 0.001 to 1 m"};
-  if (!(request.range_m > config.nearest_m))
-    return Error{"--range", text(request.range_m, " m is too near"), "give the largest depth to believe"};
+  constexpr double kMost_m = 1000;
+  if (!(request.range_m > config.nearest_m && request.range_m <= kMost_m))
+    return Error{"--range", text(request.range_m, " m is no range of a depth camera"),
+                 text("give the largest depth to believe, ", config.nearest_m, " to ", kMost_m, " m")};
   config.voxel_m = request.voxel_m, config.farthest_m = request.range_m;
-  config.along_rays = !request.every_voxel;
   return config;
 }
 
@@ -224,8 +225,6 @@ void add_map_depth(CLI::App& map, std::function<int()>& run) {
       ->delimiter(',');
   depth->add_option("--range", o->range_m, "largest depth that is believed, m")->capture_default_str();
   depth->add_option("--voxel", o->voxel_m, "side of a cube that has one point, m")->capture_default_str();
-  depth->add_flag("--every-voxel", o->every_voxel,
-                  "a point for every voxel, also where one surface fills several behind each other");
   depth->add_option("--max-gap", o->max_gap_s, "longest time between poses that is interpolated, s")
       ->capture_default_str();
   depth->add_option("--threads", o->threads, "that work; the cloud is the same for any number")

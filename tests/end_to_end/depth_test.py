@@ -180,7 +180,9 @@ class DepthTest(unittest.TestCase):
         self.refused("--scale: 0 is no number", more=["--scale", "0"])
         self.refused("--voxel: 0 m", more=["--voxel", "0"])
         self.refused("--range: 0 m", more=["--range", "0"])
+        self.refused("--range: inf m", more=["--range", "inf"])
         self.refused("--noise: ", more=["--noise", "0.001"])
+        self.refused("--noise: ", more=["--noise", "inf,0"])
         self.refused("no pixel has a depth", more=["--scale", "1000000"])
 
 

@@ -211,12 +211,7 @@ std::vector<MeasuredPoint> DepthFusion::points(ThreadPool& pool) const {
   pool.for_chunks(keys.size(), kChunk, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Voxel& voxel = voxels_.at(keys[i]);
-      if (!config_.along_rays) {
-        const double sigma_m = std::sqrt(voxel.count / static_cast<double>(voxel.weight));
-        parts[chunk].push_back({mean_of(keys[i], voxel), static_cast<float>(sigma_m), voxel.count});
-      } else if (is_heaviest(keys[i], voxel)) {
-        parts[chunk].push_back(fused(keys[i], voxel));
-      }
+      if (is_heaviest(keys[i], voxel)) parts[chunk].push_back(fused(keys[i], voxel));
     }
   });
   std::vector<MeasuredPoint> out;

@@ -31,7 +31,6 @@ struct DepthFusionConfig {
   DepthNoise noise;
   double nearest_m = 0.1, farthest_m = 5;  ///< depths that are believed
   double voxel_m = 0.01;
-  bool along_rays = true;  ///< false: each voxel gives a point, whatever stands before or behind
   std::size_t most_voxels = 20'000'000;  ///< some 100 bytes each
 };
 

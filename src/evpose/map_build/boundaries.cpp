@@ -34,8 +34,7 @@ struct Traced {
 class BoundaryFinder {
  public:
   BoundaryFinder(const BoundaryInput& input, std::size_t number, const BoundaryConfig& config)
-      : surface_(input.surface),
-        tree_(input.tree),
+      : tree_(input.tree),
         views_(input.views),
         plane_(input.planes.planes[number]),
         number_(static_cast<std::int32_t>(number)),
@@ -65,7 +64,6 @@ class BoundaryFinder {
   std::vector<FittedEdge> fit_chunks(const Circle& circle, double from_rad, double to_rad, int chunks) const;
   std::vector<LineSegment> fit_arc(const Ring& ring, const ArcStretch& stretch) const;
 
-  const SurfacePoints& surface_;
   const Neighbours& tree_;
   std::span<const View> views_;
   const FittedPlane& plane_;

@@ -369,7 +369,8 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
   c.start_translation_sigma_m.setConstant(5e-3);
   FusionConfig config = flight_config(c);
   config.segment_offsets = SegmentOffsetUse::on;
-  config.segments.sigma_m = 3e-3;
+  constexpr double kOffsetSigma_m = 3e-3;
+  config.segments.sigma_px = 200 * kOffsetSigma_m;  // in the image; the map states none
   config.start_position_sigma_m = 0.01;
   config.start_rotation_sigma_rad = 5e-3;
   double nees = 0, worst = 0;
@@ -380,7 +381,7 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
     wrong.turn = draw(random, c.start_rotation_sigma_rad.x());
     wrong.shift = draw(random, c.start_translation_sigma_m.x());
     wrong.start << draw(random, config.start_position_sigma_m), draw(random, config.start_rotation_sigma_rad);
-    for (int i = 0; i < kSegments; ++i) wrong.offsets_m.push_back(draw(random, config.segments.sigma_m).x());
+    for (int i = 0; i < kSegments; ++i) wrong.offsets_m.push_back(draw(random, kOffsetSigma_m).x());
     const Found found = fly(wrong, config, 6, 200 + run);
     ASSERT_EQ(found.segments.size(), kSegments);
     ASSERT_EQ(found.covariance.rows(), kStates);
@@ -400,7 +401,7 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
     EXPECT_LT(found.calibration.time_sigma_s, 0.05 * c.start_time_sigma_s);
     EXPECT_LT(found.calibration.turn_sigma_rad.maxCoeff(), 0.3 * c.start_rotation_sigma_rad.x());
     EXPECT_LT(found.calibration.shift_sigma_m.maxCoeff(), 0.5 * c.start_translation_sigma_m.x());
-    EXPECT_LT(sigma.tail(kSegments).maxCoeff(), 0.8 * config.segments.sigma_m);
+    EXPECT_LT(sigma.tail(kSegments).maxCoeff(), 0.8 * kOffsetSigma_m);
   }
   EXPECT_NEAR(nees, 1, 0.3);
   EXPECT_LT(worst, 4);

@@ -24,7 +24,8 @@ void describe(ConfigTable& table, FusionConfig& c) {
   table.add(
       "segment_offsets", c.segment_offsets,
       {{"off", SegmentOffsetUse::off}, {"on", SegmentOffsetUse::on}, {"auto", SegmentOffsetUse::automatic}},
-      "estimate the offset of each map segment in view (ekf); auto: of maps that state errors");
+      "estimate the offset of each map segment in view (ekf); auto: of maps that state errors, and without an "
+      "IMU with a lens of which nothing is stated");
   table.add("window_s", c.window_s, "s", "graph: states older than this are marginalised", {1e-3, 10});
   table.add("particles", c.particles, "", "particle filter: number of particles", {20, 1e6});
 }
@@ -74,7 +75,7 @@ Eigen::MatrixXd CalibrationConfig::start_covariance(Kind a, Kind b) const {
   return sigma(a).asDiagonal() * correlation(a, b) * sigma(b).asDiagonal();
 }
 
-Expected<FusionConfig> resolved(const FusionConfig& config, bool map_states_errors) {
+Expected<FusionConfig> resolved(const FusionConfig& config, bool contours_stand_off) {
   FusionConfig out = config;
   const bool filter = config.kind == BackEndKind::ekf;
   if (!filter && config.calibration.any())
@@ -84,7 +85,7 @@ Expected<FusionConfig> resolved(const FusionConfig& config, bool map_states_erro
     return Error{"fusion.kind", "only ekf estimates offsets of map segments",
                  "set fusion.kind=ekf, or fusion.segment_offsets=off"};
   if (config.segment_offsets == SegmentOffsetUse::automatic)
-    out.segment_offsets = filter && map_states_errors ? SegmentOffsetUse::on : SegmentOffsetUse::off;
+    out.segment_offsets = filter && contours_stand_off ? SegmentOffsetUse::on : SegmentOffsetUse::off;
   return out;
 }
 

@@ -38,13 +38,15 @@ struct CalibrationConfig {
 };
 void describe(ConfigTable& table, CalibrationConfig& config);
 
-/// Whether offsets of single map segments are states, by BackEndKind::ekf; automatic: where the map states
-/// errors of its contours, as one that was built from a cloud.
+/// Whether offsets of single map segments are states, by BackEndKind::ekf; automatic: where contours may stand
+/// off. The map states errors of its contours, as one that was built from a cloud, or the lens is not known
+/// well and is no state.
 enum class SegmentOffsetUse { off, on, automatic };
 
 /// Of the model of a map whose contours stand off. Constants of the method, without keys.
 struct SegmentOffsetConfig {
   double sigma_m = 6e-3;  ///< of an offset, beside what the map states: some segments stand on another edge
+  double sigma_px = 0.2;  ///< of an offset where the map states none, in the first view of it
   double length_m = 0.6;  ///< of a segment: shorter ones are seen too briefly to be told from the pose
   int most = 200;         ///< that are states at a time; the update's cost grows with its square
 };
@@ -76,6 +78,6 @@ void describe(ConfigTable& table, FusionConfig& config);
 
 /// The configuration with its automatic choices made for this map. Error: the framework cannot estimate what
 /// it is asked to.
-Expected<FusionConfig> resolved(const FusionConfig& config, bool map_states_errors);
+Expected<FusionConfig> resolved(const FusionConfig& config, bool contours_stand_off);
 
 }  // namespace evpose

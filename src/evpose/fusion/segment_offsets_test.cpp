@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kOffsetSigma_m = 1e-3, kStartSigma_m = 5e-3, kStartSigma_rad = 2e-3;
 constexpr double kWeight_px2 = 400;  // a twentieth of a pixel
+constexpr double kPxPerM = 200;      // in the image, of what the contours do in the map
 
 FusionConfig some_config(int most_segments = 100) {
   FusionConfig config;
@@ -20,6 +21,7 @@ FusionConfig some_config(int most_segments = 100) {
   config.start_rotation_sigma_rad = kStartSigma_rad;
   config.segment_offsets = SegmentOffsetUse::on;
   config.segments.sigma_m = kOffsetSigma_m;
+  config.segments.sigma_px = kOffsetSigma_m * kPxPerM;  // the contours below state no error
   config.segments.most = most_segments;
   return config;
 }
@@ -42,7 +44,7 @@ std::vector<ContourOffset> some_contours(int segments) {
     const Eigen::Vector3d middle(2 * place(random), 2 * place(random), 3 + place(random));
     const Eigen::Vector3d across = Eigen::Vector3d(place(random), place(random), 0).normalized();
     for (int k = 0; k < 4; ++k)
-      contours.push_back({middle + 0.05 * k * Eigen::Vector3d(-across.y(), across.x(), 0), 200.0 * across, 0,
+      contours.push_back({middle + 0.05 * k * Eigen::Vector3d(-across.y(), across.x(), 0), kPxPerM * across, 0,
                           kWeight_px2, static_cast<std::uint32_t>(10 * segment)});
   }
   return contours;
@@ -200,6 +202,25 @@ TEST(SegmentOffsets, ASegmentWithoutAStateSaysNothing) {
   const Matrix15d& P = one.state().covariance;
   EXPECT_LT((both.state().covariance - P).norm(), 1e-9 * P.norm());
   EXPECT_LT(one.state().nav.T_map_body.minus(both.state().nav.T_map_body).norm(), 1e-12);
+}
+
+// Of a contour's own error and the model's; in pixels where the map states none.
+TEST(SegmentOffsets, BeginWithWhatTheMapStatesOrWithAPartOfAPixel) {
+  ErrorStateFilter filter = Ekf(some_propagator(), some_config()).filter();
+  SegmentOffsetConfig config;
+  SegmentOffsets offsets(config);
+  ContourOffset contour = some_contours(1)[0];
+  const auto sigma_m = [&] {
+    const auto row = offsets.row_of(contour, filter);
+    return std::sqrt(filter.covariance(row->block)(0, 0));
+  };
+  EXPECT_NEAR(sigma_m(), config.sigma_px / kPxPerM, 1e-12);
+  contour.segment = 7;
+  contour.across_body *= 0.5;  // twice as far away
+  EXPECT_NEAR(sigma_m(), 2 * config.sigma_px / kPxPerM, 1e-12);
+  contour.segment = 8;
+  contour.sigma_m = 8e-3;
+  EXPECT_NEAR(sigma_m(), std::hypot(config.sigma_m, 8e-3), 1e-12);
 }
 
 TEST(SegmentOffsets, AreStatesWhereTheMapStatesErrorsBesideAnyCalibration) {

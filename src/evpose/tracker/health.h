@@ -16,7 +16,7 @@ inline constexpr int kLeastInliers =
 
 struct HealthConfig {
   double degraded_after_s = 0.1;   ///< without an accepted registration
-  double degraded_sigma_px = 2.0;  ///< pose uncertainty, as image motion of the typical point
+  double degraded_sigma_px = 2.0;  ///< pose uncertainty, as motion of the image
   double lost_sigma_px = 8.0;      ///< beyond what the registration can correct
   double innovation_gate = 25;  ///< largest normalised innovation squared / 6 of a registration that is used
 };
@@ -28,7 +28,7 @@ struct Evidence {
   bool accepted = false;
   std::string refused;     ///< why not accepted
   bool searching = false;  ///< the pose is searched: it is not known
-  double sigma_px = 0;  ///< pose uncertainty as image motion of the typical point, 1 sigma, weakest direction
+  double sigma_px = 0;  ///< pose uncertainty as motion of the image, 1 sigma
   std::string weakest;  ///< that direction in words
   std::string fault;    ///< what is wrong with the data, if anything
   bool verified = true;           ///< the events have confirmed the pose since it was given or found

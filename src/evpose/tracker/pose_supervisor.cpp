@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evpose/tracker/pose_uncertainty.h"
-
 namespace evpose {
 namespace {
 
@@ -129,7 +127,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   const FusionState state = fusion.state();
   // Errors that all contours share move pose and contours together: they belong to the covariance that is
   // told, not to how far a contour may lie from where it is looked for.
-  const PoseUncertainty uncertainty(state, e.focal_px, e.typical_depth_m);
+  const PoseUncertainty uncertainty(state, e.view);
   take_verdict(e.span_s);
   verified_ |= e.frames_confirm && !searching();
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
@@ -138,7 +136,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.accepted = e.refused.empty();
   evidence.refused = e.refused;
   evidence.searching = pose_is_unconfirmed(e.t, e.registration);
-  evidence.sigma_px = uncertainty.sigma_px();
+  evidence.sigma_px = uncertainty.image_px();
   if (evidence.sigma_px > health_config_.degraded_sigma_px)
     evidence.weakest = uncertainty.weakest_direction();
   evidence.fault = e.fault;

@@ -8,6 +8,7 @@
 #include "evpose/fusion/back_end.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/health.h"
+#include "evpose/tracker/pose_uncertainty.h"
 #include "evpose/tracker/pose_verifier.h"
 #include "evpose/tracker/relocalizer.h"
 
@@ -20,8 +21,7 @@ struct UpdateEvidence {
   const RegistrationResult& registration;
   std::string refused;  ///< why the registration was not used; empty if it was
   std::string fault;    ///< what is wrong with the data, if anything
-  double typical_depth_m = 0;
-  double focal_px = 0;
+  PoseUncertainty::View view;
   bool frames_confirm = false;  ///< frames have shown the contours where the pose has them
 };
 

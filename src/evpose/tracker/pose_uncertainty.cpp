@@ -8,16 +8,51 @@
 #include "evpose/core/error.h"
 
 namespace evpose {
+namespace {
 
-PoseUncertainty::PoseUncertainty(const FusionState& state, double focal_px, double depth_m)
-    : state_(state), depth_m_(depth_m) {
+double largest_sigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(
+      std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
+}
+
+// d pixel / d error of the pose, of a point that the camera sees in a direction.
+Eigen::Matrix<double, 2, 6> image_jacobian(const Pose& T_map_body, const PoseUncertainty::View& view,
+                                           const Eigen::Vector3d& ray_cam) {
+  const Eigen::Vector3d point_cam = view.depth_m * ray_cam, point_body = view.T_body_cam * point_cam;
+  Matrix23d by_point;
+  view.camera.project(point_cam, &by_point);
+  const Matrix23d by_body_point = by_point * view.T_body_cam.q.toRotationMatrix().transpose();
+  Eigen::Matrix<double, 2, 6> out;
+  out << -by_body_point * T_map_body.q.toRotationMatrix().transpose(), by_body_point * so3::hat(point_body);
+  return out;
+}
+
+double image_sigma_px(const FusionState& state, const PoseUncertainty::View& view) {
   const Matrix6d covariance = state.pose_covariance();
-  const auto largest = [](const Eigen::Matrix3d& m) {
-    return std::sqrt(
-        std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues().maxCoeff()));
-  };
-  sigma_px_ = focal_px * std::max(largest(covariance.topLeftCorner<3, 3>()) / depth_m,
-                                  largest(covariance.bottomRightCorner<3, 3>()));
+  const ImageSize size = view.camera.size();
+  double sum = 0;
+  int count = 0;
+  for (const double x : {0.25, 0.5, 0.75}) {
+    for (const double y : {0.25, 0.5, 0.75}) {
+      const auto ray = view.camera.unproject({x * (size.width - 1), y * (size.height - 1)});
+      if (!ray) continue;
+      const auto jacobian = image_jacobian(state.nav.T_map_body, view, *ray);
+      const Eigen::Matrix2d of_pixel = jacobian * covariance * jacobian.transpose();
+      sum += Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(of_pixel).eigenvalues().maxCoeff();
+      ++count;
+    }
+  }
+  return std::sqrt(std::max(0.0, sum / count));
+}
+
+}  // namespace
+
+PoseUncertainty::PoseUncertainty(const FusionState& state, const View& view)
+    : state_(state), depth_m_(view.depth_m), image_px_(image_sigma_px(state, view)) {
+  const Matrix6d covariance = state.pose_covariance();
+  separate_px_ =
+      view.camera.focal_px() * std::max(largest_sigma(covariance.topLeftCorner<3, 3>()) / depth_m_,
+                                        largest_sigma(covariance.bottomRightCorner<3, 3>()));
 }
 
 std::string PoseUncertainty::weakest_direction() const {

@@ -27,6 +27,7 @@ constexpr double kHighConcentration = 0.42, kFewAgree = 0.4, kAlone = 1.5;
 // events have to lead to it as well.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2, kConfirmedWithin = 4;  // sigma
+constexpr int kEnoughInARow = 2;  // of views that confirm the one before them, whatever else is found beside them
 constexpr double kEdge_m = 0.6;                        // an edge whose events share errors
 constexpr double kEdgeSigma_px = 0.15;  // of such an error, beside the map's; one degree of freedom
 
@@ -320,7 +321,11 @@ bool StartAlignment::confirms_last(const Trial& view) {
 }
 
 /// `agreeing`: share of the starting points that lead there; `alone`: no other view gathers nearly as many.
-bool StartAlignment::is_right(const Trial& view, double agreeing, bool alone, bool confirmed) {
+bool StartAlignment::is_right(const Trial& view, double agreeing, bool alone) const {
+  const bool confirmed = confirmed_in_a_row_ > 0;
+  if (confirmed_in_a_row_ >= kEnoughInARow && view.concentration >= kLeastConcentration &&
+      view.support >= kLeastSupport)
+    return true;
   if (view.concentration >= kHighConcentration && (confirmed || alone || agreeing >= kFewAgree)) return true;
   return view.concentration >= kLeastConcentration && agreeing >= kLeastAgreement &&
          (confirmed || view.support >= kLeastSupport);
@@ -330,8 +335,11 @@ std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, con
   std::vector<Trial> trials;
   for (const Begin& begin : begins(prior, T_body_cam)) trials.push_back(anneal(prior, begin, T_body_cam));
   const auto best = std::ranges::max_element(trials, {}, &Trial::support);
-  const bool right = best != trials.end() &&
-                     is_right(*best, agreement(trials, *best), is_alone(trials, *best), confirms_last(*best));
+  bool right = false;
+  if (best != trials.end()) {
+    confirmed_in_a_row_ = confirms_last(*best) ? confirmed_in_a_row_ + 1 : 0;
+    right = is_right(*best, agreement(trials, *best), is_alone(trials, *best));
+  }
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);
   intervals_.clear();
   if (!right) return {};

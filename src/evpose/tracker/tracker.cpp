@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "evpose/registration/contrast_memory.h"
-#include "evpose/tracker/pose_uncertainty.h"
 #include "evpose/tracker/tracker_parts.h"
 
 namespace evpose {
@@ -43,7 +42,7 @@ Expected<std::unique_ptr<Tracker>> Tracker::create(const TrackerSetup& setup, co
   if (map.points.empty())
     return Error{map.source, "the map has no contour points", "give a map with contours"};
   if (auto ok = check_start(map, start, config.visible.far_m); !ok) return ok.error();
-  const auto fusion = resolved(config.fusion, states_errors(map));
+  const auto fusion = resolved(config.fusion, states_errors(map) || lens_is_guessed(setup, config.fusion));
   if (!fusion) return fusion.error();
   TrackerConfig resolved_config = config;
   resolved_config.fusion = *fusion;
@@ -96,8 +95,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       last_look_aside_(start.t) {
   keep_time_surface(false);
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
-  const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());
-  supervisor_.start(fusion_->state(), uncertainty.sigma_px());
+  supervisor_.start(fusion_->state(), PoseUncertainty(fusion_->state(), typical_view()).separate_px());
   const CalibrationConfig& uncertain = config.fusion.calibration;
   const bool by_events = config.frames.use != FrameUse::alone;
   if (by_events && (uncertain.intrinsics || uncertain.rotation || uncertain.translation))
@@ -358,8 +356,8 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
   Matrix6d covariance = fusion_->reported_state().pose_covariance();
   std::string reason;
   const Health health =
-      supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement), contours_.typical_depth_m(),
-                         setup_.camera->focal_px(), frames_confirm(t)},
+      supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement), typical_view(),
+                         frames_confirm(t)},
                         *fusion_, &reason);
   covariance += supervisor_.doubt();
   reporter_.add_judgement(health, std::move(reason), covariance);

@@ -133,6 +133,9 @@ class Tracker {
   bool fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured);
   bool needs_no_frame() const;
   FrameInput::Seen frame_view() const;
+  PoseUncertainty::View typical_view() const {
+    return {*setup_.camera, setup_.T_body_cam, contours_.typical_depth_m()};
+  }
   void fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets, double share = 1);
   bool frames_confirm(TimeNs t) const { return frames_ && frames_->confirms(t); }
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Tracker: what frames add to the events.
-#include "evpose/tracker/pose_uncertainty.h"
 #include "evpose/tracker/tracker.h"
 
 namespace evpose {
@@ -28,9 +27,9 @@ bool Tracker::fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured) 
 
 /// Where events hold the pose, a frame adds little but its own lasting errors.
 bool Tracker::needs_no_frame() const {
-  const PoseUncertainty uncertainty(fusion_->state(), setup_.camera->focal_px(), contours_.typical_depth_m());
+  const PoseUncertainty uncertainty(fusion_->state(), typical_view());
   return config_.frames.use == FrameUse::fused && supervisor_.initialised() &&
-         uncertainty.sigma_px() < kSureByEvents_px;
+         uncertainty.separate_px() < kSureByEvents_px;
 }
 
 /// What a frame is measured with: the contours, and the state since they were projected.

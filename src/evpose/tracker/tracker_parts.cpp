@@ -84,6 +84,11 @@ Status check_start(const ContourMap& map, const StartState& start, double far_m)
   return {};
 }
 
+bool lens_is_guessed(const TrackerSetup& setup, const FusionConfig& fusion) {
+  if (!fusion.calibration.on || !setup.calibration_sigma || setup.motion == MotionModel::imu) return false;
+  return !setup.calibration_sigma->intrinsics && !setup.calibration_sigma->distortion;
+}
+
 void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
   CalibrationConfig& c = fusion.calibration;
   c.time_offset = c.rotation = c.translation = c.intrinsics = false;
@@ -98,8 +103,7 @@ void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
     c.translation = (c.start_translation_sigma_m.array() > 0).any();
   }
   // Held by constant velocity alone, the pose is too loose to tell the camera from nothing that was stated.
-  const bool held = setup.motion == MotionModel::imu || sigma.intrinsics || sigma.distortion;
-  if (!setup.intrinsics || !held) return;
+  if (!setup.intrinsics || lens_is_guessed(setup, fusion)) return;
   c.start_intrinsics_sigma = sigma.of_intrinsics(*setup.intrinsics);
   c.intrinsics = (c.start_intrinsics_sigma.array() > 0).any();
   if (sigma.correlation) c.start_correlation = sigma.of_correlation(*setup.intrinsics);

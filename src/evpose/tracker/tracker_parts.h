@@ -36,4 +36,7 @@ Status check_start(const ContourMap& map, const StartState& start, double far_m)
 /// intrinsics of which nothing is stated count as known.
 void choose_states(const TrackerSetup& setup, FusionConfig& fusion);
 
+/// The lens is not known well, and choose_states() leaves it out.
+bool lens_is_guessed(const TrackerSetup& setup, const FusionConfig& fusion);
+
 }  // namespace evpose

@@ -68,6 +68,39 @@ std::optional<RayHit> nearest(RTCScene scene, int part, const Eigen::Vector3d& o
   return RayHit{query.ray.tfar, part, query.hit.primID};
 }
 
+// Eight rays at a time.
+void nearest_of_each(RTCScene scene, const Eigen::Vector3d& origin,
+                     std::span<const Eigen::Vector3f> directions, std::span<RayCaster::BatchHit> hits) {
+  constexpr std::size_t kWide = 8;
+  const Eigen::Vector3f from = origin.cast<float>();
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  for (std::size_t first = 0; first < directions.size(); first += kWide) {
+    const std::size_t n = std::min(kWide, directions.size() - first);
+    RTCRayHit8 query{};
+    alignas(32) std::array<int, kWide> valid{};
+    for (std::size_t i = 0; i < n; ++i) {
+      valid[i] = -1;
+      query.ray.org_x[i] = from.x();
+      query.ray.org_y[i] = from.y();
+      query.ray.org_z[i] = from.z();
+      query.ray.dir_x[i] = directions[first + i].x();
+      query.ray.dir_y[i] = directions[first + i].y();
+      query.ray.dir_z[i] = directions[first + i].z();
+      query.ray.tfar[i] = std::numeric_limits<float>::infinity();
+      query.ray.mask[i] = ~0u;
+      query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    rtcIntersect8(valid.data(), scene, &context, &query);
+    for (std::size_t i = 0; i < n; ++i) {
+      const bool met = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      hits[first + i] = {query.ray.tfar[i], met ? query.hit.primID[i] : RayCaster::kNoTriangle};
+    }
+  }
+}
+
 }  // namespace
 
 struct RayCaster::Impl {
@@ -95,11 +128,6 @@ std::optional<RayHit> RayCaster::trace(const Eigen::Vector3d& origin, const Eige
   return nearest(impl_->still.get(), -1, origin, direction, near, far);
 }
 
-std::optional<RayHit> RayCaster::trace_part(int part, const Eigen::Vector3d& origin,
-                                            const Eigen::Vector3d& direction, float near, float far) const {
-  return nearest(impl_->moving[part].get(), part, origin, direction, near, far);
-}
-
 std::vector<Pose> RayCaster::parts_at(double t_s) const {
   std::vector<Pose> poses;
   for (const MovingPart& part : scene_.moving) poses.push_back(part.T_map_part(t_s));
@@ -111,8 +139,8 @@ std::optional<RayHit> RayCaster::trace(const std::vector<Pose>& T_map_part, cons
   std::optional<RayHit> hit = trace(origin, direction, near, far);
   for (std::size_t i = 0; i < T_map_part.size(); ++i) {
     const Pose T_part_map = T_map_part[i].inverse();
-    const auto closer = trace_part(static_cast<int>(i), T_part_map * origin, T_part_map.q * direction, near,
-                                   hit ? hit->distance : far);
+    const auto closer = nearest(impl_->moving[i].get(), static_cast<int>(i), T_part_map * origin,
+                                T_part_map.q * direction, near, hit ? hit->distance : far);
     if (closer) hit = closer;
   }
   return hit;
@@ -120,34 +148,13 @@ std::optional<RayHit> RayCaster::trace(const std::vector<Pose>& T_map_part, cons
 
 void RayCaster::trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
                             std::span<BatchHit> hits) const {
-  constexpr std::size_t kWide = 8;
-  const Eigen::Vector3f from = origin.cast<float>();
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  for (std::size_t first = 0; first < directions.size(); first += kWide) {
-    const std::size_t n = std::min(kWide, directions.size() - first);
-    RTCRayHit8 query{};
-    alignas(32) std::array<int, kWide> valid{};
-    for (std::size_t i = 0; i < n; ++i) {
-      valid[i] = -1;
-      query.ray.org_x[i] = from.x();
-      query.ray.org_y[i] = from.y();
-      query.ray.org_z[i] = from.z();
-      query.ray.dir_x[i] = directions[first + i].x();
-      query.ray.dir_y[i] = directions[first + i].y();
-      query.ray.dir_z[i] = directions[first + i].z();
-      query.ray.tfar[i] = std::numeric_limits<float>::infinity();
-      query.ray.mask[i] = ~0u;
-      query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-      query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-    }
-    rtcIntersect8(valid.data(), impl_->still.get(), &context, &query);
-    for (std::size_t i = 0; i < n; ++i) {
-      const bool met = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-      hits[first + i] = {query.ray.tfar[i], met ? query.hit.primID[i] : kNoTriangle};
-    }
-  }
+  nearest_of_each(impl_->still.get(), origin, directions, hits);
+}
+
+void RayCaster::trace_part_batch(int part, const Eigen::Vector3d& origin,
+                                 std::span<const Eigen::Vector3f> directions,
+                                 std::span<BatchHit> hits) const {
+  nearest_of_each(impl_->moving[part].get(), origin, directions, hits);
 }
 
 unsigned RayCaster::free_segments(const Eigen::Vector3d& origin, std::span<const Segment> segments) const {

@@ -40,15 +40,15 @@ class RayCaster {
   };
   void trace_batch(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
                    std::span<BatchHit> hits) const;
+  /// The same for one moving part alone, in its own frame.
+  void trace_part_batch(int part, const Eigen::Vector3d& origin, std::span<const Eigen::Vector3f> directions,
+                        std::span<BatchHit> hits) const;
   /// Poses of the moving parts at a time: T_map_part of each.
   std::vector<Pose> parts_at(double t_s) const;
   /// First surface, moving parts included.
   std::optional<RayHit> trace(const std::vector<Pose>& T_map_part, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, float near = 0,
                               float far = std::numeric_limits<float>::infinity()) const;
-  /// One part alone, in its own frame.
-  std::optional<RayHit> trace_part(int part, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                   float near, float far) const;
   /// True if a static surface lies in between.
   bool occluded(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float near, float far) const;
 

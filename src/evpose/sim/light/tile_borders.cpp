@@ -86,20 +86,23 @@ bool TileSampler::fit_border(const PixelRay& ray, const Hits& hits, std::int32_t
 }
 
 std::array<TileSampler::Hit, kLanes> TileSampler::hits_along(
-    const PixelRay& ray, const std::array<Eigen::Vector2f, kLanes>& at) const {
+    const PixelRay& ray, const std::array<Eigen::Vector2f, kLanes>& at) {
   FloatLanes x, y;
+  std::array<Eigen::Vector3f, kLanes> directions;
   for (int i = 0; i < kLanes; ++i) {
-    const Eigen::Vector3f direction = ray.direction(at[i].x(), at[i].y());
-    x[i] = direction.x();
-    y[i] = direction.y();
+    directions[i] = ray.direction(at[i].x(), at[i].y());
+    x[i] = directions[i].x();
+    y[i] = directions[i].y();
   }
   const IntLanes shape = raster_.find(x, y).shape;
   std::array<Hit, kLanes> hits;
+  std::array<Hit*, kLanes> wanted;
   for (int i = 0; i < kLanes; ++i) {
     hits[i] = hit_of(shape[i], x[i], y[i]);
-    if (!movers_.empty()) add_movers(x[i], y[i], hits[i]);
-    hits[i].at = at[i];
+    wanted[i] = &hits[i];
   }
+  for (const int part : movers_) add_mover(part, directions, wanted);
+  for (int i = 0; i < kLanes; ++i) hits[i].at = at[i];
   return hits;
 }
 

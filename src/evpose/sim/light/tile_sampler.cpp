@@ -46,20 +46,25 @@ bool TileSampler::find_movers(std::size_t pixel) {
   return !movers_.empty();
 }
 
-void TileSampler::add_movers(float x, float y, Hit& hit) const {
-  const Eigen::Vector3d in_camera(x, y, 1);
-  for (const int part : movers_) {
-    const Pose& T_part_cam = view_->T_part_cam[part];
-    const float far = hit.group == kSky ? std::numeric_limits<float>::infinity() : 1 / hit.nearness;
-    const auto closer = prepared_.rays.trace_part(part, T_part_cam.p, T_part_cam.q * in_camera, 0, far);
-    if (!closer) continue;
-    const PartSurfaces& surfaces = prepared_.surfaces_of(part);
+// Puts what a moving part shows in front of hits in some directions.
+void TileSampler::add_mover(int part, std::span<const Eigen::Vector3f> directions, std::span<Hit*> hits) {
+  const Pose& T_part_cam = view_->T_part_cam[part];
+  const Eigen::Matrix3d R_part_cam = T_part_cam.q.toRotationMatrix();
+  in_part_.clear();
+  for (const Eigen::Vector3f& in_camera : directions)
+    in_part_.push_back((R_part_cam * in_camera.cast<double>()).cast<float>());
+  traced_.resize(in_part_.size());
+  prepared_.rays.trace_part_batch(part, T_part_cam.p, in_part_, traced_);
+  const PartSurfaces& surfaces = prepared_.surfaces_of(part);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    Hit& hit = *hits[i];
+    if (traced_[i].triangle == RayCaster::kNoTriangle || traced_[i].distance * hit.nearness >= 1) continue;
     hit = {};
-    hit.patch = surfaces.patch_of[closer->triangle];
+    hit.patch = surfaces.patch_of[traced_[i].triangle];
     hit.group = surfaces.patches[hit.patch].group;
     hit.part = part;
-    hit.triangle = closer->triangle;
-    hit.nearness = 1 / closer->distance;
+    hit.triangle = traced_[i].triangle;
+    hit.nearness = 1 / traced_[i].distance;
   }
 }
 
@@ -67,15 +72,26 @@ void TileSampler::add_movers(float x, float y, Hit& hit) const {
 void TileSampler::trace_movers() {
   moved_.clear();
   if (plan_->movers.empty()) return;
-  for (std::size_t place = 0; place < TileRaster::kPlaces; ++place) {
+  for (std::size_t place = 0; place < TileRaster::kPlaces; ++place)
     moved_.push_back(hit_of(raster_.shape()[place], raster_.x()[place], raster_.y()[place]));
-    std::size_t pixel = place;
-    if (place >= TileRaster::kCentres) {
-      const std::size_t corner = place - TileRaster::kCentres;
-      pixel = std::min<std::size_t>(corner / TileRaster::kCorners, kTilePx - 1) * kTilePx +
-              std::min<std::size_t>(corner % TileRaster::kCorners, kTilePx - 1);
+  constexpr std::size_t kLast = TileRaster::kCentres + TileRaster::kCorners * TileRaster::kCorners;
+  for (const TilePlan::Mover& m : plan_->movers) {
+    const auto covers = [&](std::size_t column, std::size_t row) {
+      const int x = plan_->tile.x0 + static_cast<int>(std::min<std::size_t>(column, kTilePx - 1)),
+                y = plan_->tile.y0 + static_cast<int>(std::min<std::size_t>(row, kTilePx - 1));
+      return x >= m.x0 && x < m.x1 && y >= m.y0 && y < m.y1;
+    };
+    directions_.clear();
+    wanted_.clear();
+    for (std::size_t place = 0; place < kLast; ++place) {
+      const bool centre = place < TileRaster::kCentres;
+      const std::size_t wide = centre ? kTilePx : TileRaster::kCorners,
+                        i = centre ? place : place - TileRaster::kCentres;
+      if (!covers(i % wide, i / wide)) continue;
+      directions_.emplace_back(raster_.x()[place], raster_.y()[place], 1.0F);
+      wanted_.push_back(&moved_[place]);
     }
-    if (find_movers(pixel)) add_movers(raster_.x()[place], raster_.y()[place], moved_.back());
+    if (!wanted_.empty()) add_mover(m.part, directions_, wanted_);
   }
 }
 

@@ -81,7 +81,7 @@ class TileSampler {
   /// Areas of pixels overlap: their corners are not those of the raster.
   bool is_wide() const { return rays_[0].width > 1; }
   Hit hit_of(std::int32_t shape, float x, float y) const;
-  void add_movers(float x, float y, Hit& hit) const;
+  void add_mover(int part, std::span<const Eigen::Vector3f> directions, std::span<Hit*> hits);
   void trace_movers();
   Hit hit_at(std::size_t place) const;
   std::int32_t number_of_shape(std::int32_t shape);
@@ -96,8 +96,7 @@ class TileSampler {
   void want_sides(std::size_t pixel, const Hits& hits, BorderSample& border);
   void want_scan_lines(std::size_t pixel, const Hits& hits);
   void scan(std::size_t pixel, bool across_columns, float begin, float end);
-  std::array<Hit, kLanes> hits_along(const PixelRay& ray,
-                                     const std::array<Eigen::Vector2f, kLanes>& at) const;
+  std::array<Hit, kLanes> hits_along(const PixelRay& ray, const std::array<Eigen::Vector2f, kLanes>& at);
   bool fit_border(const PixelRay& ray, const Hits& hits, std::int32_t group, BorderSample& out) const;
   bool separates(const Border& border, const PixelRay& ray, const Hits& hits, std::int32_t group,
                  BorderSample& out) const;
@@ -115,6 +114,9 @@ class TileSampler {
   std::vector<int> movers_;            ///< moving parts that may cover the current pixel
   std::vector<Hit> moved_;             ///< at all places; empty: nothing moves here
   std::vector<Hit> between_;           ///< of a widened pixel: half-way to its corners
+  std::vector<Eigen::Vector3f> directions_, in_part_;
+  std::vector<Hit*> wanted_;
+  std::vector<RayCaster::BatchHit> traced_;
   std::vector<Pending> pending_;
   std::vector<Side> sides_;
 };

@@ -68,6 +68,45 @@ TEST(WorldsRays, TheConeOverTheLandingPadIsFree) {
   }
 }
 
+// What one ray at a time finds among static and moving surfaces is what batches find, part by part.
+TEST(WorldsRays, BatchesOfMovingPartsAreSingleRays) {
+  WorldConfig config;
+  config.seed = 2;
+  config.movers.people = 4;
+  WorldBuilder builder(config);
+  ASSERT_TRUE(build_world(builder).ok());
+  const RayCaster rays(builder.scene);
+  const std::vector<Pose> parts = rays.parts_at(1.3);
+  const V eye = 0.5 * (builder.scene.low + builder.scene.high);
+  Random random(11);
+  std::vector<Eigen::Vector3f> ways;
+  for (int i = 0; i < 20003; ++i)
+    ways.emplace_back(Eigen::Vector3d(random.normal(), random.normal(), 0.3 * random.normal()).cast<float>());
+  std::vector<RayCaster::BatchHit> nearest(ways.size()), own(ways.size());
+  rays.trace_batch(eye, ways, nearest);
+  std::vector<int> of(ways.size(), -1);
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    const Pose T_part_map = parts[part].inverse();
+    std::vector<Eigen::Vector3f> turned;
+    for (const Eigen::Vector3f& way : ways)
+      turned.emplace_back((T_part_map.q * way.cast<double>()).cast<float>());
+    rays.trace_part_batch(static_cast<int>(part), T_part_map * eye, turned, own);
+    for (std::size_t i = 0; i < ways.size(); ++i)
+      if (own[i].triangle != RayCaster::kNoTriangle && own[i].distance < nearest[i].distance)
+        nearest[i] = own[i], of[i] = static_cast<int>(part);
+  }
+  int moving = 0;
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    const auto hit = rays.trace(parts, eye, ways[i].cast<double>());
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->part, of[i]) << i;
+    EXPECT_EQ(hit->triangle, nearest[i].triangle) << i;
+    EXPECT_FLOAT_EQ(hit->distance, nearest[i].distance) << i;
+    moving += hit->part >= 0;
+  }
+  EXPECT_GT(moving, 100);
+}
+
 // No ray from the free space hits a back face: bodies are closed where they are visible.
 TEST(WorldsRays, OnlyFrontsAreSeen) {
   for (const WorldKind kind : kKinds) {

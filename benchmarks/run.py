@@ -39,6 +39,7 @@ BENCHMARKS = {
     "relocalization": ("experiments", "make_relocalization", "starts from wrong poses and with wrong maps", "20 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
+    "residuals": ("residuals", "make", "events beside the contours of the true pose; wants the flights of unseen", "5 min"),
     "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "45 min"),
     "calibrate": ("calibrate", "make", "calibrations from flights, from starts that are far off", "15 min"),
     "boards": ("boards", "make", "calibrations before printed boards, beside frames and OpenCV; wants cv2", "20 min"),

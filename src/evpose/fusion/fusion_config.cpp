@@ -24,8 +24,8 @@ void describe(ConfigTable& table, FusionConfig& c) {
   table.add(
       "segment_offsets", c.segment_offsets,
       {{"off", SegmentOffsetUse::off}, {"on", SegmentOffsetUse::on}, {"auto", SegmentOffsetUse::automatic}},
-      "estimate the offset of each map segment in view (ekf); auto: of maps that state errors, and without an "
-      "IMU with a lens of which nothing is stated");
+      "estimate the offset of each map segment in view (ekf); auto: of maps that state errors, and without "
+      "an IMU where the lens is not known");
   table.add("window_s", c.window_s, "s", "graph: states older than this are marginalised", {1e-3, 10});
   table.add("particles", c.particles, "", "particle filter: number of particles", {20, 1e6});
 }

@@ -38,9 +38,9 @@ struct CalibrationConfig {
 };
 void describe(ConfigTable& table, CalibrationConfig& config);
 
-/// Whether offsets of single map segments are states, by BackEndKind::ekf; automatic: where contours may stand
-/// off. The map states errors of its contours, as one that was built from a cloud, or the lens is not known
-/// well and is no state.
+/// Whether offsets of single map segments are states, by BackEndKind::ekf; automatic: where contours may
+/// stand off. The map states errors of its contours, as one that was built from a cloud, or the lens is not
+/// known well and is no state.
 enum class SegmentOffsetUse { off, on, automatic };
 
 /// Of the model of a map whose contours stand off. Constants of the method, without keys.

@@ -23,8 +23,7 @@ SegmentOffsets::Segment* SegmentOffsets::find_or_add(const ContourOffset& contou
     segment.seen = now;
     return &segment;
   }
-  const double own_m =
-      contour.sigma_m > 0 ? config_.sigma_m : config_.sigma_px / contour.across_body.norm();
+  const double own_m = contour.sigma_m > 0 ? config_.sigma_m : config_.sigma_px / contour.across_body.norm();
   const Eigen::VectorXd sigma = Eigen::VectorXd::Constant(1, std::hypot(own_m, contour.sigma_m));
   std::size_t place = segments_.size();
   if (static_cast<int>(place) < config_.most) {

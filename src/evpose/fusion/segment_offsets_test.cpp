@@ -44,8 +44,8 @@ std::vector<ContourOffset> some_contours(int segments) {
     const Eigen::Vector3d middle(2 * place(random), 2 * place(random), 3 + place(random));
     const Eigen::Vector3d across = Eigen::Vector3d(place(random), place(random), 0).normalized();
     for (int k = 0; k < 4; ++k)
-      contours.push_back({middle + 0.05 * k * Eigen::Vector3d(-across.y(), across.x(), 0), kPxPerM * across, 0,
-                          kWeight_px2, static_cast<std::uint32_t>(10 * segment)});
+      contours.push_back({middle + 0.05 * k * Eigen::Vector3d(-across.y(), across.x(), 0), kPxPerM * across,
+                          0, kWeight_px2, static_cast<std::uint32_t>(10 * segment)});
   }
   return contours;
 }

@@ -26,11 +26,11 @@ void describe(ConfigTable& table, HealthConfig& config);
 struct Evidence {
   TimeNs t = 0;
   bool accepted = false;
-  std::string refused;     ///< why not accepted
-  bool searching = false;  ///< the pose is searched: it is not known
-  double sigma_px = 0;  ///< pose uncertainty as motion of the image, 1 sigma
-  std::string weakest;  ///< that direction in words
-  std::string fault;    ///< what is wrong with the data, if anything
+  std::string refused;            ///< why not accepted
+  bool searching = false;         ///< the pose is searched: it is not known
+  double sigma_px = 0;            ///< pose uncertainty as motion of the image, 1 sigma
+  std::string weakest;            ///< that direction in words
+  std::string fault;              ///< what is wrong with the data, if anything
   bool verified = true;           ///< the events have confirmed the pose since it was given or found
   std::string contradicted = {};  ///< what speaks against the pose, if the events do
   bool hopeless = false;          ///< for so long that no pose near by can be the true one

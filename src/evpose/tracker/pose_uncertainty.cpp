@@ -50,9 +50,8 @@ double image_sigma_px(const FusionState& state, const PoseUncertainty::View& vie
 PoseUncertainty::PoseUncertainty(const FusionState& state, const View& view)
     : state_(state), depth_m_(view.depth_m), image_px_(image_sigma_px(state, view)) {
   const Matrix6d covariance = state.pose_covariance();
-  separate_px_ =
-      view.camera.focal_px() * std::max(largest_sigma(covariance.topLeftCorner<3, 3>()) / depth_m_,
-                                        largest_sigma(covariance.bottomRightCorner<3, 3>()));
+  separate_px_ = view.camera.focal_px() * std::max(largest_sigma(covariance.topLeftCorner<3, 3>()) / depth_m_,
+                                                   largest_sigma(covariance.bottomRightCorner<3, 3>()));
 }
 
 std::string PoseUncertainty::weakest_direction() const {

@@ -27,8 +27,9 @@ constexpr double kHighConcentration = 0.42, kFewAgree = 0.4, kAlone = 1.5;
 // events have to lead to it as well.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2, kConfirmedWithin = 4;  // sigma
-constexpr int kEnoughInARow = 2;  // of views that confirm the one before them, whatever else is found beside them
-constexpr double kEdge_m = 0.6;                        // an edge whose events share errors
+constexpr int kEnoughInARow =
+    2;  // of views that confirm the one before them, whatever else is found beside them
+constexpr double kEdge_m = 0.6;         // an edge whose events share errors
 constexpr double kEdgeSigma_px = 0.15;  // of such an error, beside the map's; one degree of freedom
 
 // Points to refine with, and to search with.

@@ -355,10 +355,9 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
                     const std::string& refused) {
   Matrix6d covariance = fusion_->reported_state().pose_covariance();
   std::string reason;
-  const Health health =
-      supervisor_.judge({t, span_s, measurement, refused, fault(t, measurement), typical_view(),
-                         frames_confirm(t)},
-                        *fusion_, &reason);
+  const Health health = supervisor_.judge(
+      {t, span_s, measurement, refused, fault(t, measurement), typical_view(), frames_confirm(t)}, *fusion_,
+      &reason);
   covariance += supervisor_.doubt();
   reporter_.add_judgement(health, std::move(reason), covariance);
 }

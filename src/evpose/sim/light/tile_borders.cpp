@@ -85,8 +85,8 @@ bool TileSampler::fit_border(const PixelRay& ray, const Hits& hits, std::int32_t
   return separates(border_of(prepared_, *view_, out), ray, hits, group, out);
 }
 
-std::array<TileSampler::Hit, kLanes> TileSampler::hits_along(
-    const PixelRay& ray, const std::array<Eigen::Vector2f, kLanes>& at) {
+std::array<TileSampler::Hit, kLanes> TileSampler::hits_along(const PixelRay& ray,
+                                                             const std::array<Eigen::Vector2f, kLanes>& at) {
   FloatLanes x, y;
   std::array<Eigen::Vector3f, kLanes> directions;
   for (int i = 0; i < kLanes; ++i) {

@@ -27,8 +27,9 @@ constexpr double kHighConcentration = 0.42, kFewAgree = 0.4, kAlone = 1.5;
 // events have to lead to it as well.
 constexpr double kLeastConcentration = 0.2, kLeastAgreement = 0.6, kLeastSupport = 0.2;
 constexpr double kSameView = 2, kConfirmedWithin = 4;  // sigma
-constexpr int kEnoughInARow =
-    2;  // of views that confirm the one before them, whatever else is found beside them
+// Of views that confirm the one before them, whatever else is found beside them.
+constexpr int kEnoughInARow = 2;
+constexpr double kInARowConcentration = 0.25, kInARowSupport = 0.1;
 constexpr double kEdge_m = 0.6;         // an edge whose events share errors
 constexpr double kEdgeSigma_px = 0.15;  // of such an error, beside the map's; one degree of freedom
 
@@ -311,21 +312,28 @@ bool StartAlignment::is_alone(std::span<const Trial> trials, const Trial& view) 
   });
 }
 
-/// Whether this view is the one that the last call found. That began from the same prior, but for what the
-/// IMU has added since.
-bool StartAlignment::confirms_last(const Trial& view) {
+/// Whether this view is the one that the last call found, from other events. The IMU has carried the prior on
+/// since then, with the error of its velocity.
+bool StartAlignment::confirms_last(const SeenPrior& prior, const Trial& view) {
+  const std::uint32_t now_us = intervals_[0].now_us;
+  const double since_s = 1e-6 * static_cast<double>(now_us - std::exchange(last_us_, now_us));
   const Eigen::VectorXd last = std::exchange(last_moved_, view.moved);
   if (last.size() != view.moved.size()) return false;
-  Eigen::VectorXd d = view.moved - last;
-  d.segment<3>(6).setZero();
-  return d.dot(view.H * d) < kConfirmedWithin * kConfirmedWithin * static_cast<double>(d.size());
+  std::vector<Eigen::Index> kept{0, 1, 2, 3, 4, 5};  // without the velocity
+  for (Eigen::Index i = 9; i < last.size(); ++i) kept.push_back(i);
+  const Eigen::MatrixXd of_view = (view.H + information_of(prior.covariance)).inverse();
+  Eigen::MatrixXd covariance = 2 * of_view(kept, kept);  // the last one's was much the same
+  covariance.topLeftCorner<3, 3>() += since_s * since_s * prior.covariance.block<3, 3>(6, 6);
+  const Eigen::VectorXd d = (view.moved - last)(kept);
+  return d.dot(covariance.ldlt().solve(d)) <
+         kConfirmedWithin * kConfirmedWithin * static_cast<double>(d.size());
 }
 
 /// `agreeing`: share of the starting points that lead there; `alone`: no other view gathers nearly as many.
 bool StartAlignment::is_right(const Trial& view, double agreeing, bool alone) const {
   const bool confirmed = confirmed_in_a_row_ > 0;
-  if (confirmed_in_a_row_ >= kEnoughInARow && view.concentration >= kLeastConcentration &&
-      view.support >= kLeastSupport)
+  if (confirmed_in_a_row_ >= kEnoughInARow && view.concentration >= kInARowConcentration &&
+      view.support >= kInARowSupport)
     return true;
   if (view.concentration >= kHighConcentration && (confirmed || alone || agreeing >= kFewAgree)) return true;
   return view.concentration >= kLeastConcentration && agreeing >= kLeastAgreement &&
@@ -338,7 +346,7 @@ std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, con
   const auto best = std::ranges::max_element(trials, {}, &Trial::support);
   bool right = false;
   if (best != trials.end()) {
-    confirmed_in_a_row_ = confirms_last(*best) ? confirmed_in_a_row_ + 1 : 0;
+    confirmed_in_a_row_ = confirms_last(prior, *best) ? confirmed_in_a_row_ + 1 : 0;
     right = is_right(*best, agreement(trials, *best), is_alone(trials, *best));
   }
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);

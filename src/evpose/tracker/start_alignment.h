@@ -84,7 +84,7 @@ class StartAlignment {
                                     std::span<const std::uint32_t> slots, std::size_t count) const;
   Trial anneal(const SeenPrior& prior, const Begin& begin, const Pose& T_body_cam);
   std::vector<std::uint32_t> visible_from(const Pose& T_map_cam, const VisibleSetConfig& config) const;
-  bool confirms_last(const Trial& view);
+  bool confirms_last(const SeenPrior& prior, const Trial& view);
   bool is_right(const Trial& view, double agreeing, bool alone) const;
   void look(const SeenPrior& prior, const Pose& T_body_cam, std::span<const std::uint32_t> points,
             EventRegistration& registration, Trial& trial);
@@ -109,6 +109,7 @@ class StartAlignment {
   EventIntervals intervals_;
   std::vector<ContourSample> samples_;
   Eigen::VectorXd last_moved_;  ///< of the view that the last call found; empty: there was none
+  std::uint32_t last_us_ = 0;   ///< when that was
   int confirmed_in_a_row_ = 0;  ///< of the last calls' views, each the one before it
 };
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "evpose/tracker/contour_profiles.h"
+#include "evpose/tracker/view_agreement.h"
 
 namespace evpose {
 namespace {
@@ -319,14 +320,9 @@ bool StartAlignment::confirms_last(const SeenPrior& prior, const Trial& view) {
   const double since_s = 1e-6 * static_cast<double>(now_us - std::exchange(last_us_, now_us));
   const Eigen::VectorXd last = std::exchange(last_moved_, view.moved);
   if (last.size() != view.moved.size()) return false;
-  std::vector<Eigen::Index> kept{0, 1, 2, 3, 4, 5};  // without the velocity
-  for (Eigen::Index i = 9; i < last.size(); ++i) kept.push_back(i);
   const Eigen::MatrixXd of_view = (view.H + information_of(prior.covariance)).inverse();
-  Eigen::MatrixXd covariance = 2 * of_view(kept, kept);  // the last one's was much the same
-  covariance.topLeftCorner<3, 3>() += since_s * since_s * prior.covariance.block<3, 3>(6, 6);
-  const Eigen::VectorXd d = (view.moved - last)(kept);
-  return d.dot(covariance.ldlt().solve(d)) <
-         kConfirmedWithin * kConfirmedWithin * static_cast<double>(d.size());
+  return view_distance2(view.moved, last, of_view, prior.covariance.block<3, 3>(6, 6), since_s) <
+         kConfirmedWithin * kConfirmedWithin;
 }
 
 /// `agreeing`: share of the starting points that lead there; `alone`: no other view gathers nearly as many.

@@ -136,7 +136,9 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.accepted = e.refused.empty();
   evidence.refused = e.refused;
   evidence.searching = pose_is_unconfirmed(e.t, e.registration);
-  evidence.sigma_px = uncertainty.image_px();
+  // Without an IMU nothing but the image tells rotation from sideways motion: it is enough that it holds.
+  const bool by_image_alone = fusion.propagator().model() == MotionModel::constant_velocity;
+  evidence.sigma_px = by_image_alone ? uncertainty.image_px() : uncertainty.separate_px();
   if (evidence.sigma_px > health_config_.degraded_sigma_px)
     evidence.weakest = uncertainty.weakest_direction();
   evidence.fault = e.fault;

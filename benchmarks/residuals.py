@@ -6,7 +6,7 @@ import pathlib
 
 import tables
 
-UNSEEN = 12  # the first of them that were made
+UNSEEN = 2  # the first of them that were made: one of 1280x720 takes minutes
 FEWEST = 500  # events of a class, or looks, below which a recording does not count in a spread
 FEWEST_LOOKS = 50
 DELAY, SENSE, SPEED, TIME = "events per crossing", "sense", "speed", "time between looks s"

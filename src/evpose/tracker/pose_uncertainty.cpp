@@ -27,16 +27,25 @@ Eigen::Matrix<double, 2, 6> image_jacobian(const Pose& T_map_body, const PoseUnc
   return out;
 }
 
-double image_sigma_px(const FusionState& state, const PoseUncertainty::View& view) {
+}  // namespace
+
+PoseUncertainty::PoseUncertainty(const FusionState& state, const View& view) : state_(state), view_(view) {
   const Matrix6d covariance = state.pose_covariance();
-  const ImageSize size = view.camera.size();
+  separate_px_ =
+      view.camera.focal_px() * std::max(largest_sigma(covariance.topLeftCorner<3, 3>()) / view.depth_m,
+                                        largest_sigma(covariance.bottomRightCorner<3, 3>()));
+}
+
+double PoseUncertainty::image_px() const {
+  const Matrix6d covariance = state_.pose_covariance();
+  const ImageSize size = view_.camera.size();
   double sum = 0;
   int count = 0;
   for (const double x : {0.25, 0.5, 0.75}) {
     for (const double y : {0.25, 0.5, 0.75}) {
-      const auto ray = view.camera.unproject({x * (size.width - 1), y * (size.height - 1)});
+      const auto ray = view_.camera.unproject({x * (size.width - 1), y * (size.height - 1)});
       if (!ray) continue;
-      const auto jacobian = image_jacobian(state.nav.T_map_body, view, *ray);
+      const auto jacobian = image_jacobian(state_.nav.T_map_body, view_, *ray);
       const Eigen::Matrix2d of_pixel = jacobian * covariance * jacobian.transpose();
       sum += Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(of_pixel).eigenvalues().maxCoeff();
       ++count;
@@ -45,20 +54,11 @@ double image_sigma_px(const FusionState& state, const PoseUncertainty::View& vie
   return std::sqrt(std::max(0.0, sum / count));
 }
 
-}  // namespace
-
-PoseUncertainty::PoseUncertainty(const FusionState& state, const View& view)
-    : state_(state), depth_m_(view.depth_m), image_px_(image_sigma_px(state, view)) {
-  const Matrix6d covariance = state.pose_covariance();
-  separate_px_ = view.camera.focal_px() * std::max(largest_sigma(covariance.topLeftCorner<3, 3>()) / depth_m_,
-                                                   largest_sigma(covariance.bottomRightCorner<3, 3>()));
-}
-
 std::string PoseUncertainty::weakest_direction() const {
   const Matrix6d covariance = state_.pose_covariance();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> position(covariance.topLeftCorner<3, 3>()),
       rotation(covariance.bottomRightCorner<3, 3>());
-  const bool turns = rotation.eigenvalues()[2] * depth_m_ * depth_m_ > position.eigenvalues()[2];
+  const bool turns = rotation.eigenvalues()[2] * view_.depth_m * view_.depth_m > position.eigenvalues()[2];
   const Eigen::Vector3d axis = turns ? state_.nav.T_map_body.q * rotation.eigenvectors().col(2)
                                      : Eigen::Vector3d(position.eigenvectors().col(2));
   const auto digits = [](double v) { return std::round(100 * v) / 100 + 0.0; };

@@ -21,7 +21,7 @@ class PoseUncertainty {
 
   /// Of the points, rms, each in its weakest direction; position and rotation together, which may be far
   /// less sure than how the scene lies in the image. Px.
-  double image_px() const { return image_px_; }
+  double image_px() const;
   /// Of position alone and of rotation alone, the larger one, in the weakest direction. Px at the centre.
   double separate_px() const { return separate_px_; }
   /// That direction, in words.
@@ -29,7 +29,8 @@ class PoseUncertainty {
 
  private:
   const FusionState& state_;
-  double depth_m_, image_px_, separate_px_;
+  View view_;
+  double separate_px_;
 };
 
 }  // namespace evpose

@@ -100,9 +100,8 @@ Expected<std::unique_ptr<Source>> open_source(const std::string& address, const 
 /// Makes the trackers of a session. The first is made before the data come, since that takes a while.
 class TrackerMaker {
  public:
-  /// `pictures`: the trackers keep what is drawn.
-  static Expected<TrackerMaker> create(const TrackJob& job, bool pictures) {
-    TrackerMaker out(job, pictures);
+  static Expected<TrackerMaker> create(const TrackJob& job) {
+    TrackerMaker out(job);
     auto first = out.make(job.start, false);
     if (!first) return first.error();
     out.first_ = std::move(*first);
@@ -119,16 +118,13 @@ class TrackerMaker {
       fusion.start_rotation_sigma_rad = std::max(fusion.start_rotation_sigma_rad, kAgainRotation_rad);
       fusion.start_velocity_sigma_m_s = std::max(fusion.start_velocity_sigma_m_s, kAgainSpeed_m_s);
     }
-    auto made = Tracker::create(job_->setup, config, start, wall_s);
-    if (made) (*made)->keep_time_surface(pictures_);
-    return made;
+    return Tracker::create(job_->setup, config, start, wall_s);
   }
 
  private:
-  TrackerMaker(const TrackJob& job, bool pictures) : job_(&job), pictures_(pictures) {}
+  explicit TrackerMaker(const TrackJob& job) : job_(&job) {}
 
   const TrackJob* job_;
-  bool pictures_;
   std::unique_ptr<Tracker> first_;
 };
 
@@ -167,6 +163,7 @@ void print_outcome(const Session& session, const StreamQueue& queue, const Outpu
               static_cast<unsigned long long>(q.events_shed + c.events_shed + thinned),
               static_cast<unsigned long long>(c.events_late),
               static_cast<unsigned long long>(q.most_waiting));
+  if (c.updates > 0) std::printf("contours looked at: %s\n", outputs.looked_at().c_str());
   if (outputs.delays().count() > 0)
     std::printf("delay from an update's instant to the outputs: p50 %.2f ms, p99 %.2f ms, largest %.2f ms\n",
                 outputs.delays().quantile_ms(0.5), outputs.delays().quantile_ms(0.99),
@@ -257,7 +254,7 @@ Expected<int> serve(const ServeRequest& request) {
   if (const double speed = config->replay.speed; !live && speed != 1)
     log_warning(speed > 0 ? text("not real time: the recording is replayed at ", speed, " times its speed")
                           : std::string("not real time: the recording is replayed as fast as it is tracked"));
-  auto maker = TrackerMaker::create(*job, request.view >= 0);
+  auto maker = TrackerMaker::create(*job);
   if (!maker) return maker.error();
   const auto placement = read_map_placement(job->map->source);
   if (!placement) return placement.error();
@@ -265,13 +262,13 @@ Expected<int> serve(const ServeRequest& request) {
   Outputs outputs(*config, *job, *placement);
   if (auto ok = outputs.open(request, *config, *job); !ok) return ok.error();
 
-  Session session(
-      config->session, job->recording.has_imu, job->start, live ? std::nullopt : std::optional(job->start.t),
-      [&](const StartState& start, bool again) { return maker->make(start, again); },
-      {[&](const Update& u, TimeNs offset, const Tracker& tracker) { outputs.add(u, offset, tracker); },
-       [&](const std::string& why) { outputs.restarted(why); },
-       [&](const std::string& what) { outputs.stalled(what); },
-       [&](const std::string& words) { outputs.notice(words); }});
+  Session session(config->session, job->recording.has_imu, job->start,
+                  live ? std::nullopt : std::optional(job->start.t),
+                  [&](const StartState& start, bool again) { return maker->make(start, again); },
+                  {[&](const Update& u, TimeNs offset, Tracker& tracker) { outputs.add(u, offset, tracker); },
+                   [&](const std::string& why) { outputs.restarted(why); },
+                   [&](const std::string& what) { outputs.stalled(what); },
+                   [&](const std::string& words) { outputs.notice(words); }});
   StreamQueue queue(config->queue);
   const InterruptGuard guard;
   std::signal(SIGHUP, ask_reset);

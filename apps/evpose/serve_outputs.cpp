@@ -72,7 +72,7 @@ Status Outputs::open(const ServeRequest& request, const ServeConfig& config, con
   return {};
 }
 
-void Outputs::add(const Update& u, TimeNs data_to_monotonic, const Tracker& tracker) {
+void Outputs::add(const Update& u, TimeNs data_to_monotonic, Tracker& tracker) {
   if (reporter_) reporter_->add(u, data_to_monotonic);
   const TimeNs delay = monotonic_ns() - (u.t + data_to_monotonic);
   delays_.add(delay);
@@ -86,6 +86,8 @@ void Outputs::add(const Update& u, TimeNs data_to_monotonic, const Tracker& trac
   }
   health_ = u.health;
   ++updates_[static_cast<std::size_t>(u.health)];
+  least_share_ = std::min(least_share_, u.share);
+  sum_of_shares_ += u.share;
   if (!u.reason.empty()) log_detail(text(to_string(u.health), ": ", u.reason));
   if (run_ && u.t > recorded_until_) {
     run_->add(u);
@@ -123,6 +125,14 @@ RunVerdict Outputs::verdict() const {
   const auto tracking = updates_[static_cast<std::size_t>(Health::tracking)];
   return {judged_ == 0 ? 0 : static_cast<double>(tracking) / static_cast<double>(judged_),
           to_seconds(last_t_ - first_t_), problems_of(changes, last_t_)};
+}
+
+std::string Outputs::looked_at() const {
+  if (least_share_ >= 1) return "all";
+  std::array<char, 60> words{};
+  std::snprintf(words.data(), words.size(), "%.1f %% on average, at least %.1f %%",
+                100 * sum_of_shares_ / static_cast<double>(delays_.count()), 100 * least_share_);
+  return words.data();
 }
 
 std::string Outputs::healths() const {

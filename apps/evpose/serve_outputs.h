@@ -44,7 +44,7 @@ class Outputs {
   Outputs(const ServeConfig& config, const TrackJob& job, const MapPlacement& placement);
 
   Status open(const ServeRequest& request, const ServeConfig& config, const TrackJob& job);
-  void add(const Update& u, TimeNs data_to_monotonic, const Tracker& tracker);
+  void add(const Update& u, TimeNs data_to_monotonic, Tracker& tracker);
   void restarted(const std::string& why);
   void notice(const std::string& words);
   void stalled(const std::string& what);
@@ -52,6 +52,8 @@ class Outputs {
   void service(TimeNs now_ns);
 
   Health health() const { return health_; }
+  /// Of the contours, whose events were looked at: "all", or "43.2 % on average, at least 5.0 %".
+  std::string looked_at() const;
   /// How the updates were judged: "tracking 98.5 %, initialising 1.5 %"; empty without updates.
   std::string healths() const;
   /// How tracking went as a whole, from the last changes of health.
@@ -69,9 +71,10 @@ class Outputs {
   TimeNs recorded_until_ = std::numeric_limits<TimeNs>::min();
   Health health_ = Health::waiting;
   std::array<std::uint64_t, 5> updates_{};  ///< by health
-  std::deque<HealthChange> changes_;        ///< the last ones
-  std::uint64_t judged_ = 0;                ///< updates that count in the share that was tracked
-  TimeNs first_t_ = 0, last_t_ = 0;         ///< of updates
+  double least_share_ = 1, sum_of_shares_ = 0;
+  std::deque<HealthChange> changes_;  ///< the last ones
+  std::uint64_t judged_ = 0;          ///< updates that count in the share that was tracked
+  TimeNs first_t_ = 0, last_t_ = 0;   ///< of updates
   Delays delays_;
 };
 

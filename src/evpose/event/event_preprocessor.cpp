@@ -27,20 +27,16 @@ void describe(ConfigTable& table, EventPreprocessorConfig& c) {
 EventPreprocessor::EventPreprocessor(int width, int height, const EventPreprocessorConfig& config)
     : config_(config), width_(width), height_(height), noise_filter_(width, height, config.noise) {}
 
-void EventPreprocessor::set_motion(double flow_px_per_s) {
-  noise_filter_.set_motion(flow_px_per_s);
-  if (drawn_) drawn_->filter.set_motion(flow_px_per_s);
-}
+void EventPreprocessor::set_motion(double flow_px_per_s) { noise_filter_.set_motion(flow_px_per_s); }
 
 void EventPreprocessor::keep_surface(bool on) {
-  if (!on) return drawn_.reset();
-  if (!drawn_)
-    drawn_.emplace(Drawn{NoiseFilter(width_, height_, config_.noise), TimeSurface(width_, height_)});
+  drawing_ = on;
+  if (on && !surface_) surface_.emplace(width_, height_);
 }
 
 void EventPreprocessor::rebase(std::uint32_t shift_us) {
   noise_filter_.rebase(shift_us);
-  if (drawn_) drawn_->filter.rebase(shift_us), drawn_->surface.rebase(shift_us);
+  if (surface_) surface_->rebase(shift_us);
   refilled_us_ = refilled_us_ > shift_us ? refilled_us_ - shift_us : 0;
   for (FilteredEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
@@ -62,11 +58,10 @@ void EventPreprocessor::take(const EventPacket& packet, std::span<const Event> e
   else
     take_where(events, base, [](const Event&) { return true; });
   counts_.kept += static_cast<std::int64_t>(kept_.size() - before);
-  if (!drawn_) return;
+  if (!drawing_) return;
   if (interest_ != nullptr) return draw(events, base);
   for (std::size_t i = before; i < kept_.size(); ++i)
-    drawn_->surface.insert(kept_[i].x, kept_[i].y, kept_[i].on ? Polarity::on : Polarity::off,
-                           kept_[i].stamp_us);
+    surface_->insert(kept_[i].x, kept_[i].y, kept_[i].on ? Polarity::on : Polarity::off, kept_[i].stamp_us);
 }
 
 /// Most events matter nowhere: each is written in any case and kept by counting, as a branch would be guessed
@@ -74,18 +69,21 @@ void EventPreprocessor::take(const EventPacket& packet, std::span<const Event> e
 template <class Matters>
 void EventPreprocessor::take_where(std::span<const Event> events, std::int64_t base_us,
                                    const Matters& matters) {
+  std::array<std::uint16_t, kBlock> which;
   std::array<FilteredEvent, kBlock> block;
   for (std::size_t begin = 0; begin < events.size(); begin += kBlock) {
+    const std::span<const Event> some = events.subspan(begin, std::min(kBlock, events.size() - begin));
     std::size_t count = 0, inside = 0;
-    const std::size_t end = std::min(begin + kBlock, events.size());
-    for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t i = 0; i < some.size(); ++i) {
       const auto in_image =
-          static_cast<std::size_t>(events[i].x < width_) & static_cast<std::size_t>(events[i].y < height_);
-      block[count] = stamped(events[i], base_us);
-      count += in_image & static_cast<std::size_t>(matters(events[i]));
+          static_cast<std::size_t>(some[i].x < width_) & static_cast<std::size_t>(some[i].y < height_);
+      which[count] = static_cast<std::uint16_t>(i);
+      count += in_image & static_cast<std::size_t>(matters(some[i]));
       inside += in_image;
     }
-    counts_.outside += static_cast<std::int64_t>(end - begin - inside);
+    counts_.outside += static_cast<std::int64_t>(some.size() - inside);
+    counts_.near += static_cast<std::int64_t>(count);
+    for (std::size_t k = 0; k < count; ++k) block[k] = stamped(some[which[k]], base_us);
     filter({block.data(), count});
   }
 }
@@ -102,8 +100,8 @@ void EventPreprocessor::filter(std::span<const FilteredEvent> events) {
 void EventPreprocessor::draw(std::span<const Event> events, std::int64_t base_us) {
   for (const Event& event : events) {
     const FilteredEvent e = stamped(event, base_us);
-    if (e.x < width_ && e.y < height_ && drawn_->filter.keep(e.x, e.y, e.stamp_us))
-      drawn_->surface.insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, e.stamp_us);
+    if (e.x < width_ && e.y < height_)
+      surface_->insert(e.x, e.y, e.on ? Polarity::on : Polarity::off, e.stamp_us);
   }
 }
 

@@ -47,18 +47,19 @@ class EventPreprocessor {
   std::span<const FilteredEvent> kept() const { return kept_; }
   void clear_kept() { kept_.clear(); }
 
-  /// From now on every event that passes a noise filter is drawn into the time surface, wherever it is, or no
-  /// longer. The surface begins empty. What is handed on is the same with it and without.
+  /// From now on every event is drawn into the time surface, or no longer: those that are handed on while
+  /// events matter everywhere, else all, as they are. It begins empty, and keeps what it holds while it is
+  /// not drawn into. What is handed on is the same with it and without.
   void keep_surface(bool on);
   /// Null unless it is kept.
-  const TimeSurface* surface() const { return drawn_ ? &drawn_->surface : nullptr; }
+  const TimeSurface* surface() const { return drawing_ ? &*surface_ : nullptr; }
   /// Stamp of a time on the events' clock, which the surface shares.
   std::uint32_t stamp(TimeNs t) const { return clock_.at(t); }
   const NoiseFilter& noise_filter() const { return noise_filter_; }
 
-  /// Kept: handed on. Shed: for the limit of the rate.
+  /// Near: where they matter. Kept: handed on. Shed: for the limit of the rate.
   struct Counts {
-    std::int64_t read = 0, kept = 0, outside = 0, shed = 0;
+    std::int64_t read = 0, near = 0, kept = 0, outside = 0, shed = 0;
   };
   const Counts& counts() const { return counts_; }
 
@@ -76,11 +77,8 @@ class EventPreprocessor {
   StampClock clock_;
   const InterestMap* interest_ = nullptr;
   NoiseFilter noise_filter_;
-  struct Drawn {
-    NoiseFilter filter;  ///< of its own: it sees events that are not handed on
-    TimeSurface surface;
-  };
-  std::optional<Drawn> drawn_;
+  std::optional<TimeSurface> surface_;
+  bool drawing_ = false;
   double allowance_ = 0;  ///< events that may come at once now; refilled at the rate's limit
   std::uint32_t refilled_us_ = 0;
   std::vector<FilteredEvent> kept_;

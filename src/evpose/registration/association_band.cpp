@@ -20,6 +20,7 @@ bool same_line(const AssociationBand& a, const AssociationBand& b) {
 constexpr std::size_t kSide = 8;  // events searched side by side
 using Floats = float __attribute__((vector_size(4 * kSide)));
 using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
+constexpr Floats kRamp{0, 1, 2, 3, 4, 5, 6, 7};
 
 float inverse(float v) { return std::abs(v) > 1 / kFarther ? 1 / v : kFarther; }
 
@@ -50,12 +51,21 @@ void for_each_row(const Rectangle& s, int cell_px, int columns, int rows, const 
   const auto last_column = static_cast<float>(columns - 1);
   const float by_nx = inverse(s.nx), by_ny = inverse(s.ny);
   const float across = wide * std::abs(by_nx), along = high * std::abs(by_ny);
-  for (float y = top; y <= bottom; ++y) {
-    // |n.r| <= wide and |t.r| <= high, solved for x.
-    const float ry = y - y0, middle_n = -s.ny * ry * by_nx, middle_t = s.nx * ry * by_ny;
-    const float first = std::max(0.0F, std::ceil(x0 + std::max(middle_n - across, middle_t - along)));
-    const float last = std::min(last_column, std::floor(x0 + std::min(middle_n + across, middle_t + along)));
-    if (first <= last) take(static_cast<int>(y), static_cast<int>(first), static_cast<int>(last));
+  const auto beyond = static_cast<float>(columns);
+  for (float y = top; y <= bottom; y += kSide) {
+    // |n.r| <= wide and |t.r| <= high, solved for x; eight rows side by side.
+    const Floats ry = kRamp + y - y0, middle_n = -s.ny * ry * by_nx, middle_t = s.nx * ry * by_ny;
+    const Floats from_n = middle_n - across, from_t = middle_t - along, to_n = middle_n + across,
+                 to_t = middle_t + along;
+    const Floats from = x0 + (from_n > from_t ? from_n : from_t), to = x0 + (to_n < to_t ? to_n : to_t);
+    const Floats low = from < 0 ? Floats{} : from > beyond ? Floats{} + beyond : from;
+    const Floats high_end = to < -1 ? Floats{} - 1 : to > last_column ? Floats{} + last_column : to;
+    Ints first = __builtin_convertvector(low, Ints), last = __builtin_convertvector(high_end, Ints);
+    first -= __builtin_convertvector(first, Floats) < low;     // up to the next whole number
+    last += __builtin_convertvector(last, Floats) > high_end;  // and down
+    const int count = std::min(static_cast<int>(kSide), static_cast<int>(bottom - y) + 1);
+    for (int l = 0; l < count; ++l)
+      if (first[l] <= last[l]) take(static_cast<int>(y) + l, first[l], last[l]);
   }
 }
 
@@ -90,10 +100,12 @@ void AssociationIndex::enter(std::int32_t number) {
                });
 }
 
-void AssociationIndex::mark(float margin_px, InterestMap* interest) const {
+void AssociationIndex::mark(std::span<const std::uint8_t> asked, float margin_px, float aside_px,
+                            InterestMap* interest) const {
   for (std::size_t i = 0; i + 1 < bands_.size(); ++i) {
+    if (asked[i] == 0) continue;
     Rectangle area = swept(bands_[i], half_length_, span_us_);
-    area.wide += margin_px;
+    area.wide += margin_px + aside_px;
     area.high += margin_px;
     for_each_row(area, InterestMap::kCell_px, interest->columns(), interest->rows(),
                  [&](int row, int first, int last) { interest->mark(row, first, last); });

@@ -48,8 +48,10 @@ class AssociationIndex {
   void find_all(std::span<const FilteredEvent> events, std::size_t first, std::uint32_t now_us,
                 std::vector<Found>* found);
 
-  /// Marks where the bands come by during the span, and `margin_px` around it.
-  void mark(float margin_px, InterestMap* interest) const;
+  /// Marks where the bands that `asked` names come by during the span, and `margin_px` around it; `aside_px`
+  /// more across them.
+  void mark(std::span<const std::uint8_t> asked, float margin_px, float aside_px,
+            InterestMap* interest) const;
 
  private:
   static constexpr int kCell_px = 8, kMostHits = 16;  // more than so many bands at one place are a tangle

@@ -176,7 +176,10 @@ TEST(AssociationIndex, TheMapOfInterestHoldsWhatIsOwned) {
     const AssociationBand s = random.band();
     const AssociationIndex index = index_of({&s, 1});
     InterestMap interest(kSize.width, kSize.height);
-    index.mark(kMargin_px, &interest);
+    const std::uint8_t asked = 1, not_asked = 0;
+    index.mark({&not_asked, 1}, kMargin_px, 0, &interest);
+    ASSERT_EQ(interest.share(), 0);
+    index.mark({&asked, 1}, kMargin_px, 0, &interest);
     for (std::uint32_t y = 0; y < 120; ++y)
       for (std::uint32_t x = 0; x < 160; ++x) {
         const Place p{static_cast<float>(x), static_cast<float>(y), random.in(0, kSpan_us)};

@@ -20,7 +20,6 @@ constexpr double kAmbiguity_px = 1;
 constexpr double kFullDelay_px_s =
     20;  // below this flow the edge delay fades out: noise, not the edge, triggers
 constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a contour and still be found
-constexpr int kClustersPerWidth = 20;     // cells whose events share an error: 32 px at VGA
 // So far beside the expected bands events matter: the prediction may differ from the forecast by 1.5 px, and
 // neighbours support each other in the noise filter.
 constexpr float kInterestMargin_px = 2.5F;
@@ -137,8 +136,13 @@ EventRegistration::Line EventRegistration::line_of(const ContourSample& s, doubl
 }
 
 /// What pixels the samples answer for.
-void EventRegistration::build_bands(std::span<const ContourSample> samples, double span_s) {
+void EventRegistration::build_bands(std::span<const ContourSample> samples, double span_s,
+                                    const BlockThinning& thinning) {
   bands_.resize(samples.size());
+  asked_.assign(samples.size(), 1);
+  all_asked_ = thinning.takes_all();
+  for (std::size_t i = 0; !all_asked_ && i < samples.size(); ++i)
+    asked_[i] = thinning.takes(samples[i].pixel);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const ContourSample& s = samples[i];
     const Eigen::Vector2f pixel = s.pixel.cast<float>(), normal = s.normal_px.cast<float>();
@@ -156,14 +160,26 @@ void EventRegistration::build_bands(std::span<const ContourSample> samples, doub
 }
 
 bool EventRegistration::expect(const RegistrationForecast& forecast, InterestMap* interest) {
-  build_bands(forecast.samples, forecast.span_s);
-  index_.mark(kInterestMargin_px, interest);
+  build_bands(forecast.samples, forecast.span_s, forecast.thinning);
+  index_.mark(asked_, kInterestMargin_px, static_cast<float>(forecast.aside_px), interest);
   return true;
 }
 
 void EventRegistration::look_at(std::span<const FilteredEvent> events, std::uint32_t now_us) {
+  const std::size_t before = found_.size();
   index_.find_all(events, looked_at_, now_us, &found_);
   looked_at_ = events.size();
+  if (!all_asked_) forget_unasked(before);
+}
+
+/// Of the events found from number `first` on, those of contours whose other events were not looked at: they
+/// would tell of a step that is too small.
+void EventRegistration::forget_unasked(std::size_t first) {
+  const auto unasked = [this](const AssociationIndex::Found& f) {
+    return asked_[static_cast<std::size_t>(f.owner.band)] == 0;
+  };
+  found_.erase(std::remove_if(found_.begin() + static_cast<std::ptrdiff_t>(first), found_.end(), unasked),
+               found_.end());
 }
 
 /// By what rules the bands judge their events, for those that have any.
@@ -262,6 +278,7 @@ void EventRegistration::learn_contrast(const RegistrationProblem& p) {
   const auto half_span_us = static_cast<float>(0.5e6 * p.span_s);
   const double swept_s = kProbeEvery * p.span_s;
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    if (asked_[i] == 0) continue;
     const ContourSample& s = p.samples[i];
     // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
     if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
@@ -275,7 +292,7 @@ void EventRegistration::learn_contrast(const RegistrationProblem& p) {
 
 /// Cell and 45 deg bin of the contour's direction.
 std::uint32_t EventRegistration::cluster_of(const ContourSample& s) const {
-  const int cell = std::max(1, size_.width / kClustersPerWidth);
+  const int cell = BlockThinning::block_px(size_);  // whose events share an error
   const int columns = size_.width / cell + 1, rows = size_.height / cell + 1;
   const int cx = std::clamp(static_cast<int>(s.pixel.x()) / cell, 0, columns - 1);
   const int cy = std::clamp(static_cast<int>(s.pixel.y()) / cell, 0, rows - 1);
@@ -315,7 +332,9 @@ void EventRegistration::sum_clusters(const RegistrationProblem& p) {
 /// Normal equations of the samples. Events of one cluster share errors: its information is capped.
 void EventRegistration::sum_information(const RegistrationProblem& p, RegistrationResult* result) {
   const double event_variance = config_.event_sigma_px * config_.event_sigma_px;
-  const double repeats = std::max(1.0, config_.correlation_time_s / std::max(p.span_s, 1e-6));
+  // Of a cell that is looked at now and then, an error that lasts is seen as often less.
+  const double repeats =
+      std::max(1.0, p.thinning.share() * config_.correlation_time_s / std::max(p.span_s, 1e-6));
   const double correction = config_.gate_truncation_correction ? concentration_.value() : 1;
   double weight = 0, square = 0;
   offsets_.clear();
@@ -358,7 +377,7 @@ void EventRegistration::mark_other_motion(const RegistrationProblem& p) {
 RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   EVPOSE_CHECK(!config_.ego_motion_test || p.surface != nullptr);
   RegistrationResult result;
-  if (!p.forecast) build_bands(p.samples, p.span_s);
+  if (!p.forecast) build_bands(p.samples, p.span_s, p.thinning);
   look_at(p.events, p.now_us);
   make_lines(p);
   sum_events(p, &result);

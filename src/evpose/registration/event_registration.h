@@ -101,7 +101,8 @@ class EventRegistration final : public Registration {
   };
   double gate_of(const ContourSample& sample) const;
   double contour_share(const ContourSample& sample) const;
-  void build_bands(std::span<const ContourSample> samples, double span_s);
+  void build_bands(std::span<const ContourSample> samples, double span_s, const BlockThinning& thinning);
+  void forget_unasked(std::size_t first);
   void make_lines(const RegistrationProblem& problem);
   Line line_of(const ContourSample& sample, double pose_variance) const;
   void sum_events(const RegistrationProblem& problem, RegistrationResult* result);
@@ -127,6 +128,8 @@ class EventRegistration final : public Registration {
   Concentration concentration_;
   // Of the last call, one for each sample; kept so that steady state allocates nothing.
   std::vector<AssociationBand> bands_;
+  std::vector<std::uint8_t> asked_;  ///< 1: events on the sample's block are looked at
+  bool all_asked_ = true;
   std::vector<Line> lines_;  ///< of bands that own events
   std::vector<AssociationIndex::Found> found_;
   std::size_t looked_at_ = 0;  ///< events, since expect()

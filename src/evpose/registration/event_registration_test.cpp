@@ -276,6 +276,46 @@ TEST_F(EventRegistrationLaws, EventsThatAreLookedAtAsTheyComeSayTheSame) {
   }
 }
 
+/// Over the turns, the estimates from a share of the blocks are those from all, each says less, and together
+/// they say no more.
+TEST_F(EventRegistrationLaws, ThinnedByBlocksTheEstimateIsUnbiasedAndSaysAsMuchLess) {
+  for (double x : {20.0, 75.0, 130.0, 190.0, 250.0}) add_line({x, 20}, {1, 0.3}, 150, 45);
+  for (double y : {50.0, 120.0, 190.0}) add_line({20, y}, {0.1, 1}, -120, 60);
+  for (unsigned seed : {1, 2, 3, 4}) draw_events(0.12, seed);
+  const RegistrationResult whole = measure();
+  for (const double share : {0.15, 0.5}) {
+    constexpr int kTurns = 200;
+    Matrix6d information = Matrix6d::Zero();
+    Vector6d vector = Vector6d::Zero();
+    int events = 0;
+    for (int turn = 0; turn < kTurns; ++turn) {
+      EventRegistration registration({320, 240}, config_);
+      InterestMap interest(320, 240);
+      const BlockThinning thinning({320, 240}, share, turn);
+      ASSERT_TRUE(registration.expect({samples_, kSpan_s, thinning}, &interest));
+      std::vector<FilteredEvent> come;
+      for (const FilteredEvent& e : events_)
+        if (interest.holds(e.x, e.y)) come.push_back(e);
+      EXPECT_LT(interest.share(), 0.8);
+      RegistrationProblem problem{come, kNow, kSpan_s, samples_, covariance_};
+      problem.forecast = ForecastError{};
+      problem.thinning = thinning;
+      const RegistrationResult r = registration.measure(problem);
+      information += r.information, vector += r.vector;
+      events += r.events;
+    }
+    EXPECT_NEAR(events, share * kTurns * whole.events, 0.02 * share * kTurns * whole.events);
+    for (int i : {0, 1}) {
+      EXPECT_NEAR(vector(i) / information(i, i), solved(whole, i), 0.02 * std::abs(solved(whole, i)));
+      // An error that a cell's events share for some updates is met as often less: its cap counts for the
+      // share.
+      const double said = information(i, i) / (kTurns * whole.information(i, i));
+      EXPECT_GT(said, 0.98 * share);
+      EXPECT_LT(said, 1.02);
+    }
+  }
+}
+
 TEST_F(EventRegistrationLaws, BandsAreReleasedAfterEachCall) {
   EventRegistration registration({320, 240}, config_);
   add_line({150, 40}, {1, 0}, 0);

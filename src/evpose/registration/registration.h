@@ -10,6 +10,7 @@
 #include "evpose/core/pose.h"
 #include "evpose/event/event_preprocessor.h"
 #include "evpose/event/interest_map.h"
+#include "evpose/registration/block_thinning.h"
 #include "evpose/registration/contour_view.h"
 
 namespace evpose {
@@ -35,6 +36,8 @@ enum class EventVerdict : std::uint8_t {
 struct RegistrationForecast {
   std::span<const ContourSample> samples;  ///< as they will be seen
   double span_s;                           ///< until then
+  BlockThinning thinning = {};             ///< where events will be looked at
+  double aside_px = 0;                     ///< so far beside the contours they matter, too
 };
 
 /// By how much the prediction differs from the forecast that its samples were made for.
@@ -55,7 +58,8 @@ struct RegistrationProblem {
   Pose T_map_body = {};                           ///< the prediction
   std::vector<EventVerdict>* verdicts = nullptr;  ///< of each event, if asked for
   std::optional<ForecastError> forecast =
-      {};  ///< the samples are those of expect(), which has seen all events
+      {};                       ///< the samples are those of expect(), which has seen all events
+  BlockThinning thinning = {};  ///< where events were looked at
 };
 
 /// What one measurement says. Near the predicted pose its cost is d^T information d / 2 - vector^T d, with d

@@ -79,18 +79,45 @@ TEST(StreamQueue, IsBoundedKeepsTheNewestAndCountsTheRest) {
   EXPECT_EQ(imu, 300);
 }
 
-TEST(StreamQueue, WhatWaitedLongerIsThinnedMore) {
+/// Packets each half a millisecond that wait so long.
+double share_after(ShareByWait& share, int packets, TimeNs from, double waited_ms) {
+  double out = 1;
+  for (int i = 0; i < packets; ++i) out = share.add(from + i * kNsPerMs / 2, waited_ms);
+  return out;
+}
+
+TEST(ShareByWait, AnUpdateThatPacketsWaitForTellsNothing) {
+  ShareByWait share(1);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(share.add(i * kNsPerMs / 2, i % 7 == 0 ? 0.2 : 30), 1);
+}
+
+TEST(ShareByWait, FallsWhileAllWaitAndRisesAgain) {
+  ShareByWait share(1);
+  const double first = share_after(share, 22, 0, 1.5);
+  EXPECT_NEAR(first, 1 / 1.5, 1e-9);
+  const double second = share_after(share, 22, 11 * kNsPerMs, 100);
+  EXPECT_NEAR(second, 0.5 * first, 1e-9) << "by no more than half at once";
+  EXPECT_EQ(share_after(share, 400, 22 * kNsPerMs, 100), ShareByWait::kLeast);
+  double before = ShareByWait::kLeast;
+  for (int i = 0; i < 60; ++i) {
+    const double now = share_after(share, 22, (300 + 11 * i) * kNsPerMs, 0.1);
+    EXPECT_TRUE(now > before || now == 1) << i;
+    before = now;
+  }
+  EXPECT_EQ(before, 1);
+}
+
+TEST(StreamQueue, WhatWaitedTooLongIsLeftOutAndFewUpdatesAreMade) {
   QueueConfig config;
-  config.thin_after_ms = 0.1;  // all of it has waited longer than this when it is taken
-  config.drop_after_ms = 1e5;
+  config.drop_after_ms = 0.1;  // all of it has waited longer than this when it is taken
   StreamQueue queue(config);
   queue.push(events_item(packet_at(0, 10'000)));
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
   StreamItem item;
   ASSERT_TRUE(queue.pop(item, 0));
-  EXPECT_LT(item.events.events.size(), 250u);  // at most one of 51
-  EXPECT_EQ(item.stride, 30) << "and few updates are made";
-  EXPECT_EQ(item.events.events.size() + queue.counts().events_shed, 10'000u);
+  EXPECT_TRUE(item.events.events.empty());
+  EXPECT_EQ(item.stride, 30);
+  EXPECT_EQ(queue.counts().events_shed, 10'000u);
 }
 
 TEST(StreamQueue, WithoutSheddingTheSourceWaits) {

@@ -130,7 +130,10 @@ void Session::take(StreamItem& item, TimeNs now_ns) {
         return;
       }
       learn_offset(item, item.events.time(item.events.events.back()));
-      if (tracker_) tracker_->set_update_stride(item.stride);
+      if (tracker_) {
+        tracker_->limit_event_share(item.share);
+        tracker_->set_update_stride(item.stride);
+      }
       return take_events(item.events, now_ns);
     case StreamItem::Kind::imu:
       return take_imu(item.imu, now_ns);

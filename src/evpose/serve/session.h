@@ -33,7 +33,7 @@ class Session {
   /// `again`: not the first start, so that the pose is uncertain.
   using MakeTracker = std::function<Expected<std::unique_ptr<Tracker>>(const StartState& start, bool again)>;
   struct Hooks {
-    std::function<void(const Update&, TimeNs data_to_monotonic, const Tracker&)> update;
+    std::function<void(const Update&, TimeNs data_to_monotonic, Tracker&)> update;
     std::function<void(const std::string& why)> restarted;  ///< a new tracker stands somewhere else
     std::function<void(const std::string& what)> stalled;   ///< no pose until the next update
     std::function<void(const std::string& words)> notice;

@@ -9,9 +9,13 @@
 namespace evpose {
 namespace {
 
-constexpr std::size_t kMostImu = 200'000;   // samples: a minute and more of the fastest IMU
-constexpr std::size_t kMostItems = 50'000;  // of any kind
-constexpr int kMostStride = 30;             // ten updates a second are left of 300
+constexpr std::size_t kMostImu = 200'000;           // samples: a minute and more of the fastest IMU
+constexpr std::size_t kMostItems = 50'000;          // of any kind
+constexpr int kMostStride = 30;                     // ten updates a second are left of 300
+constexpr double kStrides = 4;                      // steps of it until events are left out
+constexpr TimeNs kMoment = 10 * kNsPerMs;           // several updates, each of which makes packets wait
+constexpr int kFewestPackets = 4;                   // of a moment
+constexpr double kFaster = 1.1, kMostSlower = 0.5;  // steps of the share
 
 TimeNs now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -23,7 +27,8 @@ TimeNs now_ns() {
 
 void describe(ConfigTable& table, QueueConfig& c) {
   table.add("shed", c.shed, "leave out events under overload; false: the source waits, and nothing is lost");
-  table.add("thin_after_ms", c.thin_after_ms, "ms", "events that waited longer are thinned", {0.1, 1e5});
+  table.add("thin_after_ms", c.thin_after_ms, "ms",
+            "if all events of a moment waited longer, less of the contours is looked at", {0.1, 1e5});
   table.add("drop_after_ms", c.drop_after_ms, "ms", "events that waited longer are left out", {0.1, 1e5});
   table.add("most_mev", c.most_mev, "", "million events waiting at most", {1, 1000});
 }
@@ -79,18 +84,23 @@ bool StreamQueue::pop(StreamItem& item, TimeNs timeout_ns) {
   return true;
 }
 
+double ShareByWait::add(TimeNs arrived_ns, double waited_ms) {
+  least_ms_ = packets_ == 0 ? waited_ms : std::min(least_ms_, waited_ms);
+  if (packets_++ == 0) moment_began_ = arrived_ns;
+  if (packets_ < kFewestPackets || arrived_ns - moment_began_ < kMoment) return share_;
+  share_ *= least_ms_ > late_ms_ ? std::max(kMostSlower, late_ms_ / least_ms_) : kFaster;
+  share_ = std::clamp(share_, kLeast, 1.0);
+  packets_ = 0;
+  return share_;
+}
+
 void StreamQueue::relieve(StreamItem& item, TimeNs waited_ns) {
   const double waited_ms = 1e3 * to_seconds(waited_ns);
-  item.stride = std::min(kMostStride, 1 + static_cast<int>(waited_ms / (0.5 * config_.thin_after_ms)));
-  if (waited_ms <= config_.thin_after_ms) return;
-  std::vector<Event>& events = item.events.events;
-  std::size_t kept = 0;
-  if (waited_ms <= config_.drop_after_ms) {
-    const auto step = 1 + static_cast<std::size_t>(waited_ms / config_.thin_after_ms);
-    for (std::size_t i = 0; i < events.size(); i += step) events[kept++] = events[i];
-  }
-  counts_.events_shed += events.size() - kept;
-  events.resize(kept);
+  item.share = share_.add(item.arrived_ns, waited_ms);
+  item.stride = std::min(kMostStride, 1 + static_cast<int>(kStrides * waited_ms / config_.drop_after_ms));
+  if (waited_ms <= config_.drop_after_ms) return;
+  counts_.events_shed += item.events.events.size();
+  item.events.events.clear();
 }
 
 void StreamQueue::close() {

@@ -27,27 +27,44 @@ struct StreamItem {
   /// The machine's monotone clock less the data's, where the source knows it.
   std::optional<TimeNs> data_to_monotonic;
   TimeNs arrived_ns = 0;  ///< monotone clock; set by the queue
-  int stride = 1;         ///< of events; set by the queue: it keeps up with no more than every n-th update
+  double share = 1;       ///< of events; set by the queue: it keeps up with no more of the contours
+  int stride = 1;         ///< likewise: with no more than every n-th update
 };
 
 struct QueueConfig {
   bool shed = true;            ///< false: the source waits instead, and nothing is lost
-  double thin_after_ms = 20;   ///< events that waited longer are thinned, the more so the longer
+  double thin_after_ms = 1;    ///< if all events of a moment waited longer, less of the contours is looked at
   double drop_after_ms = 200;  ///< events that waited longer are left out
   int most_mev = 4;            ///< million events waiting at most
 };
 void describe(ConfigTable& table, QueueConfig& config);
 
-/// Between the thread of a source and that of the tracker. Under overload it sheds events, never IMU samples,
-/// so that the newest pose stays timely: every k-th event of a packet is kept, which is fair over the image,
-/// and every k-th update is made.
+/// What share of the contours can be looked at by a tracker whose packets waited so long. Those that wait
+/// while an update is made tell nothing: the least wait of a moment does.
+class ShareByWait {
+ public:
+  explicit ShareByWait(double late_ms) : late_ms_(late_ms) {}
+
+  /// A packet that arrived then waited so long. The share from now on, kLeast to 1.
+  double add(TimeNs arrived_ns, double waited_ms);
+  static constexpr double kLeast = 0.05;
+
+ private:
+  double late_ms_, share_ = 1, least_ms_ = 0;
+  TimeNs moment_began_ = 0;
+  int packets_ = 0;  ///< of the moment
+};
+
+/// Between the thread of a source and that of the tracker. Under overload events make way, never IMU samples,
+/// so that the newest pose stays timely: first less of the contours is looked at; where even that does not
+/// help, every k-th update is made and old packets are left out.
 class StreamQueue {
  public:
-  explicit StreamQueue(const QueueConfig& config) : config_(config) {}
+  explicit StreamQueue(const QueueConfig& config) : config_(config), share_(config.thin_after_ms) {}
 
   /// Takes an item. Without shedding it waits for room. False: the queue is closed.
   bool push(StreamItem item);
-  /// The next item, thinned if it has waited too long; false: none came within the time.
+  /// The next item; without its events if it has waited too long. False: none came within the time.
   bool pop(StreamItem& item, TimeNs timeout_ns);
   /// Wakes a source that waits; push() returns false from then on.
   void close();
@@ -66,6 +83,7 @@ class StreamQueue {
   QueueConfig config_;
   mutable std::mutex mutex_;
   std::condition_variable filled_, emptied_;
+  ShareByWait share_;
   std::deque<StreamItem> items_;
   std::size_t waiting_events_ = 0, waiting_imu_ = 0;
   bool closed_ = false;

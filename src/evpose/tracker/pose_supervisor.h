@@ -49,10 +49,10 @@ class PoseSupervisor {
   std::optional<FusionState> search(const RelocalizerInput& input, const BackEnd& fusion);
 
   /// All events since the last update, which is `span_s` ago, and the contours where the pose has them;
-  /// `elapsed_s`: since the last look.
+  /// `elapsed_s`: since the last look. See PoseVerifier::add().
   void look(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s,
-            double elapsed_s) {
-    verifier_.add(events, contours, span_s, elapsed_s);
+            double elapsed_s, const BlockThinning& thinning) {
+    verifier_.add(events, contours, span_s, elapsed_s, thinning);
   }
 
   /// The map's parts are those of another place from now on; see PoseVerifier. Not while searching.

@@ -12,10 +12,11 @@ namespace evpose {
 namespace {
 
 // Where it is looked. Patches reach over the way of the contour since the last update.
-constexpr std::array<double, 4> kAside_px{-12, -7, 7, 12};
+constexpr std::array<double, 4> kDecoys_px{-12, -7, 7, 12};
 constexpr std::array<double, 2> kAlong_px{-1.5, 1.5};  // of a sample
 constexpr double kReach_px = 1;                        // events lie so near to their contour
 constexpr int kFewestFree = 2;                         // of places beside: no other contour crosses them
+constexpr double kQuietest = 0.02;                     // of the blocks, where what comes is noise
 
 // For how long it counts.
 constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while little moves
@@ -39,13 +40,16 @@ constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
 PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides)
     : size_(size),
       confirmed_ratio_(map_hides ? kConfirmedRatio : kConfirmedRatioUnhidden),
-      counts_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
-      taken_(counts_.size()),
+      pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
+      block_px_(BlockThinning::block_px(size)),
+      block_columns_(size.width / block_px_),
+      events_in_blocks_(static_cast<std::size_t>(block_columns_ * (size.height / block_px_))),
       pieces_(pieces) {}
 
 void PoseVerifier::restart() {
   for (const std::uint32_t i : seen_) pieces_[i] = {};
   seen_.clear();
+  verdict_ = PoseVerdict::open;
 }
 
 void PoseVerifier::rearrange(std::span<const std::uint32_t> before) {
@@ -59,46 +63,54 @@ void PoseVerifier::rearrange(std::span<const std::uint32_t> before) {
   pieces_ = std::move(pieces);
   for (std::uint32_t& piece : seen_) piece = now[piece];
   std::erase(seen_, ContrastMemory::kNew);
+  verdict_ = judge();
 }
 
-/// Calls `visit` with the pixels where the contour was since the last update, had it been moved aside; false:
-/// it leaves the image.
-template <typename Visit>
-bool PoseVerifier::along(const ContourSample& s, double aside_px, double span_s, Visit visit) const {
-  const Eigen::Vector2d tangent(-s.normal_px.y(), s.normal_px.x());
+/// The pixels where the contour was since the last update, had it been moved aside, into patch_. False: it
+/// leaves the image, and those until there are in it.
+bool PoseVerifier::find_patch(const ContourSample& s, double aside_px, double span_s) {
   const double back_px = -s.speed_px_s * span_s;
   const double from = std::min(0.0, back_px) - kReach_px, to = std::max(0.0, back_px) + kReach_px;
-  const int steps = static_cast<int>(std::ceil(to - from));
-  for (const double along : kAlong_px)
-    for (int i = 0; i <= steps; ++i) {
-      const double across = aside_px + from + (to - from) * i / steps;
-      const Eigen::Vector2d at = s.pixel + across * s.normal_px + along * tangent;
-      if (!size_.contains(at, 1)) return false;
-      const auto x = static_cast<std::size_t>(at.x() + 0.5), y = static_cast<std::size_t>(at.y() + 0.5);
-      visit(y * static_cast<std::size_t>(size_.width) + x);
+  const int steps = static_cast<int>(std::ceil(to - from)), places = steps + 1;
+  const double nx = s.normal_px.x(), ny = s.normal_px.y();
+  const auto at = [&, px = s.pixel.x(), py = s.pixel.y()](int i, double along) {
+    const double across = aside_px + from + (to - from) * i / steps;
+    return Eigen::Vector2d(px + across * nx + along * -ny, py + across * ny + along * nx);
+  };
+  const auto pixel = [width = size_.width](const Eigen::Vector2d& v) {
+    return static_cast<std::uint32_t>(static_cast<int>(v.y() + 0.5) * width + static_cast<int>(v.x() + 0.5));
+  };
+  patch_.resize(kAlong_px.size() * static_cast<std::size_t>(places));
+  std::uint32_t* out = patch_.data();
+  for (const double along : kAlong_px) {
+    if (!size_.contains(at(0, along), 1) || !size_.contains(at(steps, along), 1)) {
+      for (int i = 0; size_.contains(at(i, along), 1); ++i) *out++ = pixel(at(i, along));
+      patch_.resize(static_cast<std::size_t>(out - patch_.data()));
+      return false;
     }
+    for (int i = 0; i < places; ++i) out[i] = pixel(at(i, along));
+    out += places;
+  }
   return true;
 }
 
 /// Events where the contour was, had it been moved aside; nothing if it leaves the image.
 std::optional<PoseVerifier::Look> PoseVerifier::look(const ContourSample& contour, double aside_px,
-                                                     double span_s) const {
-  Look out;
-  const bool inside = along(contour, aside_px, span_s, [&](std::size_t i) {
-    out.events += counts_[i];
-    out.crossed |= taken_[i] != 0;
-  });
-  return inside ? std::optional(out) : std::nullopt;
+                                                     double span_s) {
+  if (!find_patch(contour, aside_px, span_s)) return std::nullopt;
+  unsigned events = 0, marks = 0;
+  for (const std::uint32_t i : patch_) events += pixels_[i] & kMostEvents, marks |= pixels_[i];
+  return Look{static_cast<float>(events), (marks & kOnContour) != 0};
 }
 
-void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
+void PoseVerifier::look_at(const ContourSample& contour, double span_s, float noise_per_px) {
   const auto on = look(contour, 0, span_s);
   if (!on) return;
   std::array<Look, kDecoys> beside;
   float sum = 0;
   int free = 0;
   for (std::size_t k = 0; k < kDecoys; ++k) {
-    const auto there = look(contour, kAside_px[k], span_s);
+    const auto there = look(contour, kDecoys_px[k], span_s);
     if (!there) return;
     beside[k] = *there;
     if (!there->crossed) sum += there->events, ++free;
@@ -108,6 +120,7 @@ void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
   if (piece.way_px == 0) seen_.push_back(contour.segment);
   piece.way_px += static_cast<float>(std::abs(contour.speed_px_s) * span_s) + 1e-6F;
   piece.on += on->events;
+  piece.noise += noise_per_px * static_cast<float>(patch_.size());
   for (std::size_t k = 0; k < kDecoys; ++k)  // another contour's events say nothing of this one
     piece.beside[k] += beside[k].crossed ? sum / static_cast<float>(free) : beside[k].events;
 }
@@ -118,7 +131,7 @@ void PoseVerifier::decay(double elapsed_s) {
   std::erase_if(seen_, [&](std::uint32_t i) {
     Piece& piece = pieces_[i];
     const float share = piece.way_px > kEnoughWay_px ? keep : keep_slow;
-    piece.way_px *= share, piece.on *= share;
+    piece.way_px *= share, piece.on *= share, piece.noise *= share;
     for (float& b : piece.beside) b *= share;
     const bool forgotten = piece.way_px < kForgotten_px && piece.on < kForgotten_px;
     if (forgotten) piece = {};
@@ -126,19 +139,50 @@ void PoseVerifier::decay(double elapsed_s) {
   });
 }
 
+void PoseVerifier::count_events(std::span<const FilteredEvent> events) {
+  std::fill(events_in_blocks_.begin(), events_in_blocks_.end(), 0);
+  for (const FilteredEvent& e : events) {
+    std::uint8_t& pixel =
+        pixels_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
+    if (pixel < kMostEvents) ++pixel;
+    const int column = e.x / block_px_, row = e.y / block_px_;
+    const auto block = static_cast<std::size_t>(row * block_columns_ + column);
+    if (column < block_columns_ && block < events_in_blocks_.size()) ++events_in_blocks_[block];
+  }
+}
+
+/// Of this update: what comes in the quietest blocks.
+float PoseVerifier::noise_per_px(const BlockThinning& thinning) {
+  sorted_.clear();
+  for (std::size_t i = 0; i < events_in_blocks_.size(); ++i) {
+    const auto column = static_cast<int>(i) % block_columns_, row = static_cast<int>(i) / block_columns_;
+    if (thinning.takes(block_px_ * Eigen::Vector2d(column + 0.5, row + 0.5)))
+      sorted_.push_back(events_in_blocks_[i]);
+  }
+  if (sorted_.empty()) return 0;
+  const auto quiet =
+      sorted_.begin() + static_cast<std::ptrdiff_t>(kQuietest * static_cast<double>(sorted_.size()));
+  std::nth_element(sorted_.begin(), quiet, sorted_.end());
+  return static_cast<float>(*quiet) / static_cast<float>(block_px_ * block_px_);
+}
+
 void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours,
-                       double span_s, double elapsed_s) {
+                       double span_s, double elapsed_s, const BlockThinning& thinning) {
   decay(elapsed_s);
-  const auto count = [&](const FilteredEvent& e) -> std::uint8_t& {
-    return counts_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
-  };
-  for (const FilteredEvent& e : events)
-    if (count(e) < 255) ++count(e);
+  count_events(events);
+  const float noise = noise_per_px(thinning);
+  marked_.clear();
+  for (const ContourSample& contour : contours) {
+    find_patch(contour, 0, span_s);
+    marked_.insert(marked_.end(), patch_.begin(), patch_.end());
+  }
+  for (const std::uint32_t i : marked_) pixels_[i] |= kOnContour;
   for (const ContourSample& contour : contours)
-    along(contour, 0, span_s, [this](std::size_t i) { taken_[i] = 1; });
-  for (const ContourSample& contour : contours) look_at(contour, span_s);
-  std::fill(taken_.begin(), taken_.end(), std::uint8_t{0});
-  for (const FilteredEvent& e : events) count(e) = 0;
+    if (thinning.takes(contour.pixel)) look_at(contour, span_s, noise);
+  for (const std::uint32_t i : marked_) pixels_[i] = 0;
+  for (const FilteredEvent& e : events)
+    pixels_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x] = 0;
+  verdict_ = judge();
 }
 
 PoseEvidence PoseVerifier::evidence() const {
@@ -147,24 +191,25 @@ PoseEvidence PoseVerifier::evidence() const {
     return here - there > kSigma * std::sqrt(here + there / places + 1);
   };
   PoseEvidence out;
-  double on = 0, beside = 0, explained = 0, by_chance = 0;
+  double on = 0, beside = 0, noise = 0, explained = 0, by_chance = 0;
   for (const std::uint32_t i : seen_) {
     const Piece& p = pieces_[i];
     if (p.way_px < kLeastWay_px) continue;
     const double sum = std::accumulate(p.beside.begin(), p.beside.end(), 0.0);
     on += p.on;
     beside += sum / kDecoys;
+    noise += p.noise;
     ++out.pieces;
     explained += exceeds(p.on, sum / kDecoys, kDecoys) ? 1 : 0;
     for (const double b : p.beside) by_chance += exceeds(b, (sum - b) / (kDecoys - 1), kDecoys - 1) ? 1 : 0;
   }
   if (out.pieces < kFewestPieces || on + beside < kFewestEvents) return {};
   out.explained = (explained - by_chance / kDecoys) / out.pieces;
-  out.ratio = on / std::max(beside, 1.0);
+  out.ratio = (on - noise) / std::max(beside - noise, 1.0);
   return out;
 }
 
-PoseVerdict PoseVerifier::verdict() const {
+PoseVerdict PoseVerifier::judge() const {
   const PoseEvidence e = evidence();
   if (e.pieces == 0) return PoseVerdict::open;
   if ((e.ratio > confirmed_ratio_ && e.explained > kLeastShare) || e.ratio > kEnoughRatio ||

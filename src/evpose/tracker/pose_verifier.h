@@ -9,6 +9,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/event/event_preprocessor.h"
+#include "evpose/registration/block_thinning.h"
 #include "evpose/registration/contour_view.h"
 
 namespace evpose {
@@ -28,7 +29,8 @@ struct PoseEvidence {
 
 /// Tells a pose that the events confirm from one that only looks so: compares the events on the contours with
 /// those on the same contours moved aside in the image, piece by piece. A wrong pose that has been fitted to
-/// the events has some contours on edges of the image; most are where there is none.
+/// the events has some contours on edges of the image; most are where there is none. Events that come as
+/// often where the image is quietest as anywhere are noise, and count for neither.
 class PoseVerifier {
  public:
   /// `pieces`: number of the map's contrast segments; `map_hides`: it has surfaces that hide contours.
@@ -40,18 +42,20 @@ class PoseVerifier {
   /// (ContrastMemory::kNew).
   void rearrange(std::span<const std::uint32_t> before);
   /// One update of several: all events of its span, and the contours at its time; `elapsed_s`: since the
-  /// last one that was looked at.
+  /// last one that was looked at. `thinning`: where there are all events, out to kAside_px beside contours.
   void add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s,
-           double elapsed_s);
+           double elapsed_s, const BlockThinning& thinning = {});
+  static constexpr double kAside_px = 14;
 
   PoseEvidence evidence() const;
-  PoseVerdict verdict() const;
+  PoseVerdict verdict() const { return verdict_; }
 
  private:
   static constexpr std::size_t kDecoys = 4;
   struct Piece {
     float way_px = 0;  ///< of the contour across itself
     float on = 0;      ///< events
+    float noise = 0;   ///< of these, and of those at each place beside
     std::array<float, kDecoys> beside{};
   };
   void decay(double elapsed_s);
@@ -59,17 +63,26 @@ class PoseVerifier {
     float events = 0;
     bool crossed = false;  ///< by a contour
   };
-  std::optional<Look> look(const ContourSample& contour, double aside_px, double span_s) const;
-  void look_at(const ContourSample& contour, double span_s);
-  template <typename Visit>
-  bool along(const ContourSample& contour, double aside_px, double span_s, Visit visit) const;
+  std::optional<Look> look(const ContourSample& contour, double aside_px, double span_s);
+  void look_at(const ContourSample& contour, double span_s, float noise_per_px);
+  bool find_patch(const ContourSample& contour, double aside_px, double span_s);
+  void count_events(std::span<const FilteredEvent> events);
+  float noise_per_px(const BlockThinning& thinning);
+  PoseVerdict judge() const;
+
+  static constexpr std::uint8_t kOnContour = 0x80, kMostEvents = 0x7F;
 
   ImageSize size_;
   double confirmed_ratio_;            ///< of events on contours to those beside
-  std::vector<std::uint8_t> counts_;  ///< of this update's events, per pixel
-  std::vector<std::uint8_t> taken_;   ///< pixels on contours of this update
-  std::vector<Piece> pieces_;         ///< with exponential forgetting
-  std::vector<std::uint32_t> seen_;   ///< pieces that something was seen of
+  std::vector<std::uint8_t> pixels_;  ///< number of this update's events, kOnContour
+  int block_px_, block_columns_;      ///< of whole blocks
+  std::vector<std::int32_t> events_in_blocks_;
+  std::vector<std::int32_t> sorted_;  ///< of these
+  std::vector<std::uint32_t> patch_;  ///< pixels where a contour was, had it been moved aside
+  std::vector<std::uint32_t> marked_;
+  std::vector<Piece> pieces_;        ///< with exponential forgetting
+  std::vector<std::uint32_t> seen_;  ///< pieces that something was seen of
+  PoseVerdict verdict_ = PoseVerdict::open;
 };
 
 }  // namespace evpose

@@ -77,6 +77,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
                 config.threads > 1),
       interest_(setup_.camera->size().width, setup_.camera->size().height),
       preprocessor_(setup_.camera->size().width, setup_.camera->size().height, config.events),
+      event_share_(config.events.most_mev_s),
       input_(preprocessor_, clock),
       imu_(config.imu, setup.motion),
       registration_(make_registration(config, setup_.camera->size(), *setup_.map, map_.segments)),
@@ -168,21 +169,38 @@ FusionState Tracker::forecast() const {
 /// Once a pose is out, before the next events come: points, their bands, and where events matter.
 void Tracker::prepare_update() {
   const double began_s = reporter_.now_s();
+  choose_blocks();
   forecast_.reset();
   interest_.clear();
+  looks_aside_ = next_update_ >= last_look_aside_ + kLookAside;
   contours_.choose(fusion_->state().nav.T_map_body);
   page_map();
   if (update_number_ > 0 && !supervisor_.searching() && !start_alignment_) {
     const FusionState coming = forecast();
     const double span_s = to_seconds(next_update_ - last_update_);
     project_samples(coming, span_s);
-    if (registration_->expect({contours_.samples(), span_s}, &interest_)) forecast_ = coming.nav;
+    const double aside_px = looks_aside_ ? PoseVerifier::kAside_px : 0;
+    if (registration_->expect({contours_.samples(), span_s, thinning_, aside_px}, &interest_))
+      forecast_ = coming.nav;
   }
-  looks_aside_ = next_update_ >= last_look_aside_ + kLookAside;
-  // Verdicts are asked for of all events; search, alignment and verification look at all of them.
-  const bool all = !forecast_ || verdict_callback_ || looks_aside_;
+  if (!forecast_) thinning_ = {};
+  // Verdicts are asked for of all events; search, alignment and verification look at all of them, unless
+  // there are too many.
+  const bool all = !forecast_ || verdict_callback_ || (looks_aside_ && thinning_.takes_all());
+  if (looks_aside_ && !all) thinning_.mark(&interest_);
   preprocessor_.set_interest(all ? nullptr : &interest_);
+  near_alone_ = !all && !looks_aside_;
+  expected_span_s_ = to_seconds(next_update_ - last_update_);
   reporter_.add_preparation(reporter_.now_s() - began_s);
+}
+
+/// Where events are looked at in the coming update, by how many came since the last one.
+void Tracker::choose_blocks() {
+  const std::int64_t near = preprocessor_.counts().near;
+  if (near_alone_) event_share_.learn(near - near_seen_, expected_span_s_, thinning_.share());
+  near_seen_ = near;
+  thinning_ = verdict_callback_ ? BlockThinning()
+                                : BlockThinning(setup_.camera->size(), event_share_.share(), update_number_);
 }
 
 /// Another part of the map, if the camera has gone so far, between two choices of points.
@@ -237,7 +255,7 @@ Update Tracker::update(TimeNs t) {
   if (refused.empty()) fuse(stpe, registration_->offsets(), frames_ ? frames_->share_of_events() : 1);
   if (fuse_frame(t, aligning, stpe)) refused.clear();
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
-  reporter_.add_registration(stpe, innovation, refused.empty());
+  reporter_.add_registration(stpe, innovation, refused.empty(), thinning_.share());
   judge(t, span_s, stpe, refused);
   preprocessor_.set_motion(contours_.typical_flow_px_s());
   preprocessor_.clear_kept();
@@ -293,7 +311,7 @@ void Tracker::take_calibration() {
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   if (looks_aside_)
     supervisor_.look(preprocessor_.kept(), contours_.samples(), span_s,
-                     to_seconds(t - std::exchange(last_look_aside_, t)));
+                     to_seconds(t - std::exchange(last_look_aside_, t)), thinning_);
   const Matrix6d covariance = fusion_->measured_covariance();
   RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(),
                               covariance};
@@ -302,6 +320,7 @@ RegistrationResult Tracker::measure(TimeNs t, double span_s) {
   problem.view = &view;
   problem.T_map_body = fusion_->state().nav.T_map_body;
   if (verdict_callback_) problem.verdicts = &verdicts_;
+  problem.thinning = thinning_;
   if (forecast_) {
     const NavState& now = fusion_->state().nav;
     problem.forecast = {now.T_map_body.minus(forecast_->T_map_body), now.velocity - forecast_->velocity};

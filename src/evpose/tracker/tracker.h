@@ -13,6 +13,7 @@
 #include "evpose/core/error.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/contour_selection.h"
+#include "evpose/tracker/event_share.h"
 #include "evpose/tracker/frame_input.h"
 #include "evpose/tracker/imu_gate.h"
 #include "evpose/tracker/imu_rate_output.h"
@@ -90,6 +91,9 @@ class Tracker {
 
   /// After the next update only every n-th is made: for a driver that cannot keep up. 1: all.
   void set_update_stride(int n) { update_stride_ = n; }
+  /// After the next update no more than a share of the contours is looked at, others in each update: for a
+  /// driver that falls behind. 1: all.
+  void limit_event_share(double share) { event_share_.set_limit(share); }
   /// From now on a time surface is kept for snapshots, or no longer.
   void keep_time_surface(bool on) { preprocessor_.keep_surface(on || registration_->reads_surface()); }
 
@@ -116,6 +120,7 @@ class Tracker {
   bool feed_until(TimeNs t);
   void make_update();
   void prepare_update();
+  void choose_blocks();
   void page_map();
   FusionState forecast() const;
   void see_contours(double span_s);
@@ -152,6 +157,11 @@ class Tracker {
   std::optional<NavState> forecast_;  ///< the same, where events are looked at with it as they come
   InterestMap interest_;
   EventPreprocessor preprocessor_;
+  EventShare event_share_;
+  BlockThinning thinning_;      ///< where events are looked at
+  std::int64_t near_seen_ = 0;  ///< events that mattered, at the last update
+  bool near_alone_ = false;     ///< only those near contours matter
+  double expected_span_s_ = 0;  ///< from the last update to the next
   InputQueue input_;
   ImuGate imu_;
   std::unique_ptr<Registration> registration_;

@@ -40,6 +40,7 @@ struct Update {
   std::int32_t events_read = 0;     ///< since the last update
   std::int32_t events_shed = 0;     ///< of these, left out because too many came (events.most_mev_s)
   std::int32_t events_kept = 0;     ///< of these, passed by the noise filter
+  double share = 1;                 ///< of the contours whose events were looked at; less: too many came
   std::int32_t points = 0;          ///< chosen map points
   std::int32_t points_matched = 0;  ///< of these, with events near by
   std::int32_t events_matched = 0;  ///< events in the gate (field: events)

@@ -18,7 +18,9 @@ void UpdateReporter::end_stage(double StageTimes::*stage) {
   update_.times.*stage = now_s - std::exchange(stage_began_s_, now_s);
 }
 
-void UpdateReporter::add_registration(const RegistrationResult& r, double innovation, bool accepted) {
+void UpdateReporter::add_registration(const RegistrationResult& r, double innovation, bool accepted,
+                                      double share) {
+  update_.share = share;
   update_.innovation = innovation;
   update_.accepted = accepted;
   update_.points = r.points;

@@ -23,7 +23,9 @@ class UpdateReporter {
   /// The stage that began with begin() or with the end of the last one is done.
   void end_stage(double StageTimes::*stage);
 
-  void add_registration(const RegistrationResult& registration, double innovation, bool accepted);
+  /// `share`: of the contours that were looked at.
+  void add_registration(const RegistrationResult& registration, double innovation, bool accepted,
+                        double share);
   /// The pose's covariance as it was judged.
   void add_judgement(Health health, std::string reason, const Matrix6d& covariance);
   /// The state at the end of the update, and the counts of events until now.

@@ -14,6 +14,7 @@ namespace evpose {
 namespace {
 
 constexpr TimeNs kRow = 33 * kNsPerMs, kFlush = 66 * kNsPerMs, kPicture = 200 * kNsPerMs;  // of data time
+constexpr TimeNs kPictureLead = 50 * kNsPerMs;      // before a picture its events are kept
 constexpr std::size_t kMostHistory = 30 * 60 * 20;  // rows: twenty minutes
 
 std::string rows_json(auto begin, auto end) {
@@ -99,7 +100,7 @@ Expected<std::unique_ptr<Viewer>> Viewer::start(const ServerConfig& config, cons
   return viewer;
 }
 
-void Viewer::add(const Update& u, const Tracker& tracker, double delay_ms) {
+void Viewer::add(const Update& u, Tracker& tracker, double delay_ms) {
   if (!any_ || u.t < last_) {  // the first, or a clock that went back: the page starts anew
     const std::lock_guard lock(mutex_);
     history_.clear();
@@ -124,10 +125,18 @@ void Viewer::add(const Update& u, const Tracker& tracker, double delay_ms) {
     if (history_.size() > kMostHistory) history_.pop_front();
   }
   flush(u.t);
-  if (u.t >= next_picture_ && server_->clients() > 0) {
+  show(u, tracker);
+}
+
+/// A picture now and then while somebody looks. Between them the tracker does not keep the events.
+void Viewer::show(const Update& u, Tracker& tracker) {
+  const bool looks = server_->clients() > 0;
+  if (!looks) next_picture_ = u.t + kPictureLead;
+  if (looks && u.t >= next_picture_ && tracker.events().surface() != nullptr) {
     next_picture_ = u.t + kPicture;
     draw(tracker, u);
   }
+  tracker.keep_time_surface(looks && u.t + kPictureLead >= next_picture_);
 }
 
 void Viewer::flush(TimeNs t) {
@@ -148,7 +157,6 @@ void Viewer::notice(const std::string& words) {
 }
 
 void Viewer::draw(const Tracker& tracker, const Update& u) {
-  EVPOSE_CHECK(tracker.events().surface() != nullptr);
   const std::string picture = picture_bytes(*tracker.events().surface(), tracker.events().stamp(u.t),
                                             tracker.chosen_points(kPictureDecay_s), to_seconds(u.t - first_));
   server_->publish({std::make_shared<std::string>(picture), true});

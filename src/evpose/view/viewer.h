@@ -33,14 +33,16 @@ class Viewer {
   static Expected<std::unique_ptr<Viewer>> start(const ServerConfig& config, const std::string& title,
                                                  const ContourMap& map);
 
-  /// An update of `tracker`. `delay_ms`: from its instant to now.
-  void add(const Update& update, const Tracker& tracker, double delay_ms);
+  /// An update of `tracker`, which is told when it has to keep what is drawn. `delay_ms`: from its instant to
+  /// now.
+  void add(const Update& update, Tracker& tracker, double delay_ms);
   void notice(const std::string& words);
   std::string address() const { return server_->address(); }
 
  private:
   explicit Viewer(std::string title) : title_(std::move(title)) {}
   void flush(TimeNs t);
+  void show(const Update& update, Tracker& tracker);
   void draw(const Tracker& tracker, const Update& update);
 
   std::string title_;

@@ -6,7 +6,6 @@
 #include <cstdint>
 
 #include "evpose/camera/camera.h"
-#include "evpose/event/interest_map.h"
 
 namespace evpose {
 
@@ -27,9 +26,6 @@ class BlockThinning {
   /// Edge of a block.
   static int block_px(ImageSize size) { return std::max(1, size.width / kBlocksPerWidth); }
 
-  /// Marks the blocks that are taken.
-  void mark(InterestMap* interest) const;
-
   double share() const { return share_; }
   bool takes_all() const { return share_ >= 1; }
   /// Whether the block of this pixel is looked at; any coordinates.
@@ -45,8 +41,8 @@ class BlockThinning {
   static constexpr std::uint32_t kPerColumn = 0xC13FA9A9, kPerRow = 0x91E10DA5, kPerTurn = 0x9E3779B9;
 
   std::uint32_t block_of(double v) const {
-    constexpr double kFar_px = 1e6;
-    return static_cast<std::uint32_t>((std::clamp(v, -kFar_px, kFar_px) + kFar_px) / block_px_);
+    constexpr double kFar = 32768;
+    return static_cast<std::uint32_t>(std::clamp(v / block_px_, -kFar, kFar) + kFar);
   }
 
   int block_px_ = 1;
@@ -54,13 +50,5 @@ class BlockThinning {
   std::uint64_t below_ = std::uint64_t{1} << 32;
   std::uint32_t phase_ = 0;
 };
-
-inline void BlockThinning::mark(InterestMap* interest) const {
-  constexpr int kCell = InterestMap::kCell_px;
-  for (int row = 0; row < interest->rows(); ++row)
-    for (int column = 0; column < interest->columns(); ++column)
-      if (takes(kCell * Eigen::Vector2d(column, row)) || takes(kCell * Eigen::Vector2d(column + 1, row + 1)))
-        interest->mark(row, column, column);
-}
 
 }  // namespace evpose

@@ -93,14 +93,16 @@ TEST(ShareByWait, AnUpdateThatPacketsWaitForTellsNothing) {
 
 TEST(ShareByWait, FallsWhileAllWaitAndRisesAgain) {
   ShareByWait share(1);
-  const double first = share_after(share, 22, 0, 1.5);
+  constexpr int kMoment = 21;  // packets
+  constexpr TimeNs kLong = kMoment * kNsPerMs / 2;
+  const double first = share_after(share, kMoment, 0, 1.5);
   EXPECT_NEAR(first, 1 / 1.5, 1e-9);
-  const double second = share_after(share, 22, 11 * kNsPerMs, 100);
+  const double second = share_after(share, kMoment, kLong, 100);
   EXPECT_NEAR(second, 0.5 * first, 1e-9) << "by no more than half at once";
-  EXPECT_EQ(share_after(share, 400, 22 * kNsPerMs, 100), ShareByWait::kLeast);
+  EXPECT_EQ(share_after(share, 10 * kMoment, 2 * kLong, 100), ShareByWait::kLeast);
   double before = ShareByWait::kLeast;
   for (int i = 0; i < 60; ++i) {
-    const double now = share_after(share, 22, (300 + 11 * i) * kNsPerMs, 0.1);
+    const double now = share_after(share, kMoment, (12 + i) * kLong, 0.1);
     EXPECT_TRUE(now > before || now == 1) << i;
     before = now;
   }

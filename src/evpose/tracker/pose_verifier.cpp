@@ -16,7 +16,6 @@ constexpr std::array<double, 4> kDecoys_px{-12, -7, 7, 12};
 constexpr std::array<double, 2> kAlong_px{-1.5, 1.5};  // of a sample
 constexpr double kReach_px = 1;                        // events lie so near to their contour
 constexpr int kFewestFree = 2;                         // of places beside: no other contour crosses them
-constexpr double kQuietest = 0.02;                     // of the blocks, where what comes is noise
 
 // For how long it counts.
 constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while little moves
@@ -41,9 +40,6 @@ PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides)
     : size_(size),
       confirmed_ratio_(map_hides ? kConfirmedRatio : kConfirmedRatioUnhidden),
       pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
-      block_px_(BlockThinning::block_px(size)),
-      block_columns_(size.width / block_px_),
-      events_in_blocks_(static_cast<std::size_t>(block_columns_ * (size.height / block_px_))),
       pieces_(pieces) {}
 
 void PoseVerifier::restart() {
@@ -103,7 +99,7 @@ std::optional<PoseVerifier::Look> PoseVerifier::look(const ContourSample& contou
   return Look{static_cast<float>(events), (marks & kOnContour) != 0};
 }
 
-void PoseVerifier::look_at(const ContourSample& contour, double span_s, float noise_per_px) {
+void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
   const auto on = look(contour, 0, span_s);
   if (!on) return;
   std::array<Look, kDecoys> beside;
@@ -120,7 +116,6 @@ void PoseVerifier::look_at(const ContourSample& contour, double span_s, float no
   if (piece.way_px == 0) seen_.push_back(contour.segment);
   piece.way_px += static_cast<float>(std::abs(contour.speed_px_s) * span_s) + 1e-6F;
   piece.on += on->events;
-  piece.noise += noise_per_px * static_cast<float>(patch_.size());
   for (std::size_t k = 0; k < kDecoys; ++k)  // another contour's events say nothing of this one
     piece.beside[k] += beside[k].crossed ? sum / static_cast<float>(free) : beside[k].events;
 }
@@ -131,7 +126,7 @@ void PoseVerifier::decay(double elapsed_s) {
   std::erase_if(seen_, [&](std::uint32_t i) {
     Piece& piece = pieces_[i];
     const float share = piece.way_px > kEnoughWay_px ? keep : keep_slow;
-    piece.way_px *= share, piece.on *= share, piece.noise *= share;
+    piece.way_px *= share, piece.on *= share;
     for (float& b : piece.beside) b *= share;
     const bool forgotten = piece.way_px < kForgotten_px && piece.on < kForgotten_px;
     if (forgotten) piece = {};
@@ -139,38 +134,14 @@ void PoseVerifier::decay(double elapsed_s) {
   });
 }
 
-void PoseVerifier::count_events(std::span<const FilteredEvent> events) {
-  std::fill(events_in_blocks_.begin(), events_in_blocks_.end(), 0);
-  for (const FilteredEvent& e : events) {
-    std::uint8_t& pixel =
-        pixels_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
-    if (pixel < kMostEvents) ++pixel;
-    const int column = e.x / block_px_, row = e.y / block_px_;
-    const auto block = static_cast<std::size_t>(row * block_columns_ + column);
-    if (column < block_columns_ && block < events_in_blocks_.size()) ++events_in_blocks_[block];
-  }
-}
-
-/// Of this update: what comes in the quietest blocks.
-float PoseVerifier::noise_per_px(const BlockThinning& thinning) {
-  sorted_.clear();
-  for (std::size_t i = 0; i < events_in_blocks_.size(); ++i) {
-    const auto column = static_cast<int>(i) % block_columns_, row = static_cast<int>(i) / block_columns_;
-    if (thinning.takes(block_px_ * Eigen::Vector2d(column + 0.5, row + 0.5)))
-      sorted_.push_back(events_in_blocks_[i]);
-  }
-  if (sorted_.empty()) return 0;
-  const auto quiet =
-      sorted_.begin() + static_cast<std::ptrdiff_t>(kQuietest * static_cast<double>(sorted_.size()));
-  std::nth_element(sorted_.begin(), quiet, sorted_.end());
-  return static_cast<float>(*quiet) / static_cast<float>(block_px_ * block_px_);
-}
-
 void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours,
                        double span_s, double elapsed_s, const BlockThinning& thinning) {
   decay(elapsed_s);
-  count_events(events);
-  const float noise = noise_per_px(thinning);
+  const auto pixel_of = [this](const FilteredEvent& e) -> std::uint8_t& {
+    return pixels_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
+  };
+  for (const FilteredEvent& e : events)
+    if (pixel_of(e) < kMostEvents) ++pixel_of(e);
   marked_.clear();
   for (const ContourSample& contour : contours) {
     find_patch(contour, 0, span_s);
@@ -178,10 +149,9 @@ void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const Co
   }
   for (const std::uint32_t i : marked_) pixels_[i] |= kOnContour;
   for (const ContourSample& contour : contours)
-    if (thinning.takes(contour.pixel)) look_at(contour, span_s, noise);
+    if (thinning.takes(contour.pixel)) look_at(contour, span_s);
   for (const std::uint32_t i : marked_) pixels_[i] = 0;
-  for (const FilteredEvent& e : events)
-    pixels_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x] = 0;
+  for (const FilteredEvent& e : events) pixel_of(e) = 0;
   verdict_ = judge();
 }
 
@@ -191,21 +161,20 @@ PoseEvidence PoseVerifier::evidence() const {
     return here - there > kSigma * std::sqrt(here + there / places + 1);
   };
   PoseEvidence out;
-  double on = 0, beside = 0, noise = 0, explained = 0, by_chance = 0;
+  double on = 0, beside = 0, explained = 0, by_chance = 0;
   for (const std::uint32_t i : seen_) {
     const Piece& p = pieces_[i];
     if (p.way_px < kLeastWay_px) continue;
     const double sum = std::accumulate(p.beside.begin(), p.beside.end(), 0.0);
     on += p.on;
     beside += sum / kDecoys;
-    noise += p.noise;
     ++out.pieces;
     explained += exceeds(p.on, sum / kDecoys, kDecoys) ? 1 : 0;
     for (const double b : p.beside) by_chance += exceeds(b, (sum - b) / (kDecoys - 1), kDecoys - 1) ? 1 : 0;
   }
   if (out.pieces < kFewestPieces || on + beside < kFewestEvents) return {};
   out.explained = (explained - by_chance / kDecoys) / out.pieces;
-  out.ratio = (on - noise) / std::max(beside - noise, 1.0);
+  out.ratio = on / std::max(beside, 1.0);
   return out;
 }
 

@@ -29,8 +29,7 @@ struct PoseEvidence {
 
 /// Tells a pose that the events confirm from one that only looks so: compares the events on the contours with
 /// those on the same contours moved aside in the image, piece by piece. A wrong pose that has been fitted to
-/// the events has some contours on edges of the image; most are where there is none. Events that come as
-/// often where the image is quietest as anywhere are noise, and count for neither.
+/// the events has some contours on edges of the image; most are where there is none.
 class PoseVerifier {
  public:
   /// `pieces`: number of the map's contrast segments; `map_hides`: it has surfaces that hide contours.
@@ -55,7 +54,6 @@ class PoseVerifier {
   struct Piece {
     float way_px = 0;  ///< of the contour across itself
     float on = 0;      ///< events
-    float noise = 0;   ///< of these, and of those at each place beside
     std::array<float, kDecoys> beside{};
   };
   void decay(double elapsed_s);
@@ -64,10 +62,8 @@ class PoseVerifier {
     bool crossed = false;  ///< by a contour
   };
   std::optional<Look> look(const ContourSample& contour, double aside_px, double span_s);
-  void look_at(const ContourSample& contour, double span_s, float noise_per_px);
+  void look_at(const ContourSample& contour, double span_s);
   bool find_patch(const ContourSample& contour, double aside_px, double span_s);
-  void count_events(std::span<const FilteredEvent> events);
-  float noise_per_px(const BlockThinning& thinning);
   PoseVerdict judge() const;
 
   static constexpr std::uint8_t kOnContour = 0x80, kMostEvents = 0x7F;
@@ -75,9 +71,6 @@ class PoseVerifier {
   ImageSize size_;
   double confirmed_ratio_;            ///< of events on contours to those beside
   std::vector<std::uint8_t> pixels_;  ///< number of this update's events, kOnContour
-  int block_px_, block_columns_;      ///< of whole blocks
-  std::vector<std::int32_t> events_in_blocks_;
-  std::vector<std::int32_t> sorted_;  ///< of these
   std::vector<std::uint32_t> patch_;  ///< pixels where a contour was, had it been moved aside
   std::vector<std::uint32_t> marked_;
   std::vector<Piece> pieces_;        ///< with exponential forgetting

@@ -169,6 +169,7 @@ FusionState Tracker::forecast() const {
 /// Once a pose is out, before the next events come: points, their bands, and where events matter.
 void Tracker::prepare_update() {
   const double began_s = reporter_.now_s();
+  look_aside();
   choose_blocks();
   forecast_.reset();
   interest_.clear();
@@ -187,11 +188,19 @@ void Tracker::prepare_update() {
   // Verdicts are asked for of all events; search, alignment and verification look at all of them, unless
   // there are too many.
   const bool all = !forecast_ || verdict_callback_ || (looks_aside_ && thinning_.takes_all());
-  if (looks_aside_ && !all) thinning_.mark(&interest_);
   preprocessor_.set_interest(all ? nullptr : &interest_);
   near_alone_ = !all && !looks_aside_;
   expected_span_s_ = to_seconds(next_update_ - last_update_);
   reporter_.add_preparation(reporter_.now_s() - began_s);
+}
+
+/// What the events beside the contours say of the pose, of use from the next update on: it would keep the
+/// pose waiting.
+void Tracker::look_aside() {
+  if (looks_aside_ && !supervisor_.searching())
+    supervisor_.look(preprocessor_.kept(), contours_.samples(), expected_span_s_,
+                     to_seconds(last_update_ - std::exchange(last_look_aside_, last_update_)), thinning_);
+  preprocessor_.clear_kept();
 }
 
 /// Where events are looked at in the coming update, by how many came since the last one.
@@ -245,8 +254,9 @@ Update Tracker::update(TimeNs t) {
   see_contours(span_s);
   reporter_.end_stage(&StageTimes::predict_s);
   const bool aligning = align_start(t, moved);
-  RegistrationResult stpe =
-      supervisor_.searching() || aligning ? RegistrationResult{} : measure(t, span_s);  // eq. (1)
+  const bool measures = !supervisor_.searching() && !aligning;
+  looks_aside_ &= measures;
+  RegistrationResult stpe = measures ? measure(t, span_s) : RegistrationResult{};  // eq. (1)
   reporter_.end_stage(&StageTimes::register_s);
   const double innovation =
       evpose::innovation(fusion_->measured_covariance(), {stpe.information, stpe.vector});
@@ -258,7 +268,6 @@ Update Tracker::update(TimeNs t) {
   reporter_.add_registration(stpe, innovation, refused.empty(), thinning_.share());
   judge(t, span_s, stpe, refused);
   preprocessor_.set_motion(contours_.typical_flow_px_s());
-  preprocessor_.clear_kept();
   return reporter_.finish(fusion_->reported_state(), preprocessor_.counts());
 }
 
@@ -309,9 +318,6 @@ void Tracker::take_calibration() {
 }
 
 RegistrationResult Tracker::measure(TimeNs t, double span_s) {
-  if (looks_aside_)
-    supervisor_.look(preprocessor_.kept(), contours_.samples(), span_s,
-                     to_seconds(t - std::exchange(last_look_aside_, t)), thinning_);
   const Matrix6d covariance = fusion_->measured_covariance();
   RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), span_s, contours_.samples(),
                               covariance};

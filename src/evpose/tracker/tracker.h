@@ -120,6 +120,7 @@ class Tracker {
   bool feed_until(TimeNs t);
   void make_update();
   void prepare_update();
+  void look_aside();
   void choose_blocks();
   void page_map();
   FusionState forecast() const;

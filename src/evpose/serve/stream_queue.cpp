@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kMostImu = 200'000;           // samples: a minute and more of the fastest IMU
 constexpr std::size_t kMostItems = 50'000;          // of any kind
 constexpr int kMostStride = 30;                     // ten updates a second are left of 300
-constexpr double kStrides = 4;                      // steps of it until events are left out
+constexpr double kStride_ms = 10;                   // of waiting, for which an update more is left out
 constexpr TimeNs kMoment = 10 * kNsPerMs;           // several updates, each of which makes packets wait
 constexpr int kFewestPackets = 4;                   // of a moment
 constexpr double kFaster = 1.1, kMostSlower = 0.5;  // steps of the share
@@ -97,7 +97,8 @@ double ShareByWait::add(TimeNs arrived_ns, double waited_ms) {
 void StreamQueue::relieve(StreamItem& item, TimeNs waited_ns) {
   const double waited_ms = 1e3 * to_seconds(waited_ns);
   item.share = share_.add(item.arrived_ns, waited_ms);
-  item.stride = std::min(kMostStride, 1 + static_cast<int>(kStrides * waited_ms / config_.drop_after_ms));
+  if (item.share <= ShareByWait::kLeast)
+    item.stride = std::min(kMostStride, 1 + static_cast<int>(waited_ms / kStride_ms));
   if (waited_ms <= config_.drop_after_ms) return;
   counts_.events_shed += item.events.events.size();
   item.events.events.clear();

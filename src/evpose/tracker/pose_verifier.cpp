@@ -64,17 +64,19 @@ void PoseVerifier::rearrange(std::span<const std::uint32_t> before) {
 
 /// The pixels where the contour was since the last update, had it been moved aside, into patch_. False: it
 /// leaves the image, and those until there are in it.
-bool PoseVerifier::find_patch(const ContourSample& s, double aside_px, double span_s) {
-  const double back_px = -s.speed_px_s * span_s;
+bool PoseVerifier::find_patch(const ContourSample& contour, double aside_px, double span_s) {
+  const double back_px = -contour.speed_px_s * span_s;
   const double from = std::min(0.0, back_px) - kReach_px, to = std::max(0.0, back_px) + kReach_px;
   const int steps = static_cast<int>(std::ceil(to - from)), places = steps + 1;
-  const double nx = s.normal_px.x(), ny = s.normal_px.y();
-  const auto at = [&, px = s.pixel.x(), py = s.pixel.y()](int i, double along) {
+  const double nx = contour.normal_px.x(), ny = contour.normal_px.y();
+  const auto at = [&, px = contour.pixel.x(), py = contour.pixel.y()](int i, double along) {
     const double across = aside_px + from + (to - from) * i / steps;
     return Eigen::Vector2d(px + across * nx + along * -ny, py + across * ny + along * nx);
   };
+  constexpr double kHalf = 0.5;  // to the nearest: positions are not negative
   const auto pixel = [width = size_.width](const Eigen::Vector2d& v) {
-    return static_cast<std::uint32_t>(static_cast<int>(v.y() + 0.5) * width + static_cast<int>(v.x() + 0.5));
+    return static_cast<std::uint32_t>(static_cast<int>(v.y() + kHalf) * width +
+                                      static_cast<int>(v.x() + kHalf));
   };
   patch_.resize(kAlong_px.size() * static_cast<std::size_t>(places));
   std::uint32_t* out = patch_.data();

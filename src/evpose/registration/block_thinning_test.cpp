@@ -42,7 +42,7 @@ TEST(BlockThinning, IsFairOverTurnsAndOverTheImage) {
           quarter[static_cast<std::size_t>(2 * (row >= kRows / 2) + (column >= kColumns / 2))] += takes;
         }
       for (int q = 0; q < 4; ++q) {
-        const double blocks = kColumns / 2 * (q < 2 ? kRows / 2 : kRows - kRows / 2);
+        const int blocks = kColumns / 2 * (q < 2 ? kRows / 2 : kRows - kRows / 2);
         ASSERT_NEAR(quarter[static_cast<std::size_t>(q)], share * blocks, 4.5) << share << ' ' << turn;
       }
     }

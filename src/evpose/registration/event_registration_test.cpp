@@ -279,8 +279,8 @@ TEST_F(EventRegistrationLaws, EventsThatAreLookedAtAsTheyComeSayTheSame) {
 /// Over the turns, the estimates from a share of the blocks are those from all, each says less, and together
 /// they say no more.
 TEST_F(EventRegistrationLaws, ThinnedByBlocksTheEstimateIsUnbiasedAndSaysAsMuchLess) {
-  for (double x : {20.0, 75.0, 130.0, 190.0, 250.0}) add_line({x, 20}, {1, 0.3}, 150, 45);
-  for (double y : {50.0, 120.0, 190.0}) add_line({20, y}, {0.1, 1}, -120, 60);
+  for (double x : {75.0, 130.0, 190.0, 250.0, 300.0}) add_line({x, 20}, {1, 0.3}, 150, 45);
+  for (double y : {50.0, 120.0, 190.0}) add_line({300, y}, {0.1, 1}, -120, 60);
   for (unsigned seed : {1, 2, 3, 4}) draw_events(0.12, seed);
   const RegistrationResult whole = measure();
   for (const double share : {0.15, 0.5}) {

@@ -14,6 +14,12 @@ FAR = {"focal": 0.05, "centre_px": 20}  # of a start
 SIMULATED = ("turning_2", 8, ("camera.size=vga",))
 HEAD = ["recording", "focal %", "centre px", "image px rms", "rotation deg", "place mm", "time ms", "NEES", "largest error, sigma",
         "at rest"]
+DRAWN_SCENARIO, DRAWN_S, DRAWN, DRAWN_FROM = "turning_2", 4, 20, 200
+DRAWN_ROWS = {"focal_percent": "focal %", "centre_px": "centre px", "image_px": "image px rms", "rotation_deg": "rotation deg",
+              "place_mm": "place mm", "time_ms": "time ms", "nees": "NEES", "worst_sigma": "largest error, sigma",
+              "gyro_ideal": "gyroscope's axes, as if ideal, % rms", "gyro": "gyroscope's axes, found",
+              "accel_ideal": "accelerometer's axes, as if ideal, % rms", "accel": "accelerometer's axes, found",
+              "axes_square": "axes: mean square of error over sigma"}
 GOAL = ["goal, 10 s", "0.02", "0.1", "0.05", "0.01", "1", "0.1", "0.7 to 1.4", "", ""]
 
 
@@ -45,7 +51,9 @@ def calibrated(bench, folders, start, *words):
             said = bench.run("calibrate", *folders, "--start", scratch / "start.yaml", "-o", scratch / "found.yaml", *words)
         except harness.Failure as why:
             return {"failed": str(why)}
-        return {"chain": (scratch / "found.yaml").read_text(), "said": re.findall("^note: (.*)$", said, re.MULTILINE)}
+        imu = scratch / "found-imu.yaml"
+        return {"chain": (scratch / "found.yaml").read_text(), "imu": imu.read_text() if imu.exists() else "",
+                "said": re.findall("^note: (.*)$", said, re.MULTILINE)}
 
 
 def row(name, found, true):
@@ -57,18 +65,40 @@ def row(name, found, true):
                                                 "nees", "worst_sigma")), "yes" if rests else "no, said so"]
 
 
+def found_of(bench, recording, seed):
+    """What is found from a far start, and the truth."""
+    true = errors.read(next(recording.folder.glob("cam*.yaml")))
+    return bench.once(f"calibrate: {recording.name} {FAR}",
+                      lambda: calibrated(bench, [recording.folder], far_start(true, seed), "--map", recording.contours,
+                                         "--occluders", recording.mesh, "--init", "groundtruth")), true
+
+
 def measured(bench, recordings, first_seed):
-    rows = []
-    for seed, recording in enumerate(recordings, first_seed):
-        true = errors.read(next(recording.folder.glob("cam*.yaml")))
-        found = bench.once(f"calibrate: {recording.name} {FAR}",
-                           lambda: calibrated(bench, [recording.folder], far_start(true, seed), "--map", recording.contours,
-                                              "--occluders", recording.mesh, "--init", "groundtruth"))
-        rows.append(row(recording.name, found, true))
+    rows = [row(recording.name, *found_of(bench, recording, seed)) for seed, recording in enumerate(recordings, first_seed)]
     return tables.table(HEAD, [*rows, GOAL])
+
+
+def drawn(bench):
+    """Flights of their own seeds: distributions of errors, and of how they compare with what is stated."""
+    all_errors, refused, restless = [], 0, 0
+    for seed in range(DRAWN_FROM, DRAWN_FROM + (1 if bench.quick else DRAWN)):
+        recording = bench.simulated(DRAWN_SCENARIO, DRAWN_S, [*harness.TINY, *harness.seeds(seed)], name=f"calibrate_{seed}")
+        found, true = found_of(bench, recording, seed)
+        if "failed" in found:
+            refused += 1
+            continue
+        restless += any("come to rest" in words for words in found["said"])
+        all_errors.append(errors.judge(errors.parse(found["chain"]), true)
+                          | errors.judge_axes(found["imu"], (recording.folder / "imu_truth.yaml").read_text()))
+    count = len(all_errors)
+    said = [["flights; refused; not at rest, said so", f"{count + refused}; {refused}; {restless}", "", "", ""]]
+    return tables.table(["", "mean", "median", "90 %", "worst"],
+                        [*([words, *(f"{f(values):.2g}" for f in (np.mean, np.median, lambda v: np.quantile(v, 0.9), np.max))]
+                           for key, words in DRAWN_ROWS.items() if (values := [e[key] for e in all_errors])), *said])
 
 
 def make(bench):
     chosen_on = [*bench.peers(), bench.simulated(*SIMULATED)]
     unseen = [] if bench.quick else bench.more_peers()
-    return bench.write_page("calibrate", {"flights": measured(bench, chosen_on, 0), "unseen": measured(bench, unseen, 100)})
+    return bench.write_page("calibrate", {"flights": measured(bench, chosen_on, 0), "unseen": measured(bench, unseen, 100),
+                                          "drawn": drawn(bench)})

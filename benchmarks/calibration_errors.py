@@ -99,6 +99,23 @@ def difference(found, true):
                      found["time_s"] - true["time_s"]])
 
 
+def axes(text):
+    """Of the IMU's file, as Kalibr writes it: gyroscope and accelerometer (2, 3, 3), and their sigmas or None."""
+    imu = yaml.safe_load(text)
+    sensors = [imu[name] for name in ("gyroscopes", "accelerometers")]
+    sigma = [np.array(sensor["M_sigma"], dtype=float) for sensor in sensors if "M_sigma" in sensor]
+    return np.array([sensor["M"] for sensor in sensors], dtype=float), np.array(sigma) if len(sigma) == 2 else None
+
+
+def judge_axes(found, true):
+    """RMS errors of the elements in %, of ideal axes and of those found, and mean square of error over sigma."""
+    (M, sigma), (truth, _) = axes(found), axes(true)
+    rms = lambda values: 100 * np.sqrt(np.mean(values ** 2, axis=(1, 2)))  # noqa: E731
+    ideal, left = rms(truth - np.eye(3)), rms(M - truth)
+    return {"gyro_ideal": float(ideal[0]), "gyro": float(left[0]), "accel_ideal": float(ideal[1]), "accel": float(left[1]),
+            "axes_square": float(np.mean(((M - truth) / sigma) ** 2))}
+
+
 def judge(found, true):
     """Errors of a calibration, and how they compare with the covariance that it states."""
     off, f = difference(found, true), true["intrinsics"]

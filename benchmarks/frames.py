@@ -16,10 +16,6 @@ USES = {"events alone": "off", "frames alone": "alone", "both": "fused"}
 HEAD = ["flight", "seed", *(f"{name}: ATE mm, ARE deg, NEES/6" for name in USES), "both to the better"]
 
 
-def seeded(seed):
-    return (f"seed={seed}", f"world.seed={seed}", f"trajectory.seed={seed}")
-
-
 def measure(bench, recording):
     """Of each use of the frames: mean ATE, mean ARE, NEES/6, coverage, status."""
     out = {}
@@ -51,6 +47,6 @@ def make(bench):
     rows = []
     for name, (scenario, seconds, settings) in wanted.items():
         for seed in SEEDS[:1] if bench.quick else SEEDS:
-            flight = bench.simulated(scenario, seconds, (*harness.TINY, *settings, *seeded(seed)), "frames_" + name.split(",")[0])
+            flight = bench.simulated(scenario, seconds, (*harness.TINY, *settings, *harness.seeds(seed)), "frames_" + name.split(",")[0])
             rows.append(row(name, seed, bench.once(f"frames: {name}, {seed}", lambda: measure(bench, flight))))
     return bench.write_page("frames", {"flights": tables.table(HEAD, rows)})

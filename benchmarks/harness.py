@@ -176,6 +176,11 @@ class Bench:
         return path
 
 
+def seeds(seed):
+    """Settings of a simulated flight with a place, a trajectory and noise of its own."""
+    return (f"seed={seed}", f"world.seed={seed}", f"trajectory.seed={seed}")
+
+
 TINY = ["camera.size=custom", "camera.width=320", "camera.height=240", "camera.focal_px=190"]
 FIRST_PARAGRAPH = re.compile(r"\A(?:Made by .*?\n\n)?", re.DOTALL)
 

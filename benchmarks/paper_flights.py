@@ -20,7 +20,7 @@ HEAD = ["class", "form", *(f"seed {seed}: mean ATE mm, mean ARE deg, % with a po
 
 
 def flight(bench, scenario, seed, settings=()):
-    seeds = (f"seed={seed}", f"world.seed={seed}", f"trajectory.seed={seed}")
+    seeds = harness.seeds(seed)
     return bench.simulated(scenario, SECONDS, (*harness.TINY, *settings, *seeds), f"paper_{scenario}")
 
 

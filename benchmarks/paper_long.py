@@ -30,7 +30,7 @@ ALONE = ("--set", "overlays=0", "--set", "relocalization.on=false", "--set", "fu
 
 def flights(bench, scenario):
     for seed in SEEDS[:1] if bench.quick else SEEDS:
-        seeds = (f"seed={seed}", f"world.seed={seed}", f"trajectory.seed={seed}")
+        seeds = harness.seeds(seed)
         made = bench.simulated(scenario, SCENARIOS[scenario], (*harness.TINY, *seeds), f"paper_long_{scenario}")
         yield dataclasses.replace(made, name=f"{scenario} of {SCENARIOS[scenario]} s, seed {seed}")
 

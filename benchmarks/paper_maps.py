@@ -35,7 +35,7 @@ def measure(bench, place, recordings):
 
 def depth_flight(bench, seed):
     """A flight with exact depth images."""
-    seeds = (f"seed={seed}", f"world.seed={seed}", f"trajectory.seed={seed}")
+    seeds = harness.seeds(seed)
     made = bench.simulated("indoor_spiral", DEPTH_S, (*harness.TINY, f"depth.rate_hz={DEPTH_HZ}", *seeds), "depth_images")
     return dataclasses.replace(made, name=f"hall, seed {seed}")
 

@@ -100,8 +100,9 @@ auto worked(TrackRequest request, auto&& work) {
 
 RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map,
                const fs::path& calibration, const fs::path& occluders, const std::string& init,
-               const std::pair<double, double>& init_sigma, const Settings& settings, bool replace) {
+               const std::pair<double, double>& init_sigma, const Settings& settings, bool replace, const fs::path& imu_model) {
   TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
+  request.imu_model = imu_model.string();
   request.output = output.string();
   request.replace = replace;
   worked(request, track_recording);
@@ -110,8 +111,9 @@ RunFiles track(const fs::path& recording, const fs::path& output, const fs::path
 
 RunFiles smooth(const fs::path& recording, const fs::path& output, const fs::path& map,
                 const fs::path& calibration, const fs::path& occluders, const std::string& init,
-                const std::pair<double, double>& init_sigma, const Settings& settings, bool replace) {
+                const std::pair<double, double>& init_sigma, const Settings& settings, bool replace, const fs::path& imu_model) {
   TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
+  request.imu_model = imu_model.string();
   request.output = output.string();
   request.replace = replace;
   worked(request, smooth_recording);
@@ -156,8 +158,9 @@ Update relocalise(const fs::path& recording, const std::string& init,
 CalibrateOutcome calibrate(const std::vector<fs::path>& recordings, const fs::path& output,
                            const fs::path& map, const fs::path& calibration, const fs::path& occluders,
                            const std::string& init, const std::pair<double, double>& init_sigma,
-                           const Settings& settings, bool replace) {
+                           const Settings& settings, bool replace, const fs::path& imu_model) {
   TrackRequest request = request_of({}, map, calibration, occluders, init, init_sigma, settings);
+  request.imu_model = imu_model.string();
   request.output = output.string();
   request.replace = replace;
   const auto outcome = worked(request, [&](const TrackRequest& track) {
@@ -211,11 +214,11 @@ void bind_runs(py::module_& m) {
            "Columns of numbers of states.csv, states_imu.csv, calibration.csv or latency.csv, by name");
   const auto known = std::pair<double, double>(0, 0);
   m.def("track", &track, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
-        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
+        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false, "imu_model"_a = "",
         "What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched "
         "first");
   m.def("smooth", &smooth, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
-        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
+        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false, "imu_model"_a = "",
         "What evpose smooth does: the trajectory from all data, past and future");
   py::class_<CalibrationNumber>(m, "CalibrationNumber",
                                 "One number of a calibration, with 1-sigma uncertainties")
@@ -230,19 +233,22 @@ void bind_runs(py::module_& m) {
           "numbers", [](const CalibrateOutcome& o) { return o.page.numbers; },
           "those of the file, in the file's order")
       .def_property_readonly(
+          "imu_axes", [](const CalibrateOutcome& o) { return o.page.imu_axes; },
+          "scale and misalignment of gyroscope and accelerometer, %; empty without an IMU")
+      .def_property_readonly(
           "correlation", [](const CalibrateOutcome& o) { return o.page.correlation; },
           "(n, n), of the numbers")
       .def_property_readonly(
           "notes", [](const CalibrateOutcome& o) { return o.page.words; },
           "what the motion told and what it did not")
       .def_readonly("converged", &CalibrateOutcome::converged, "the passes have come to rest")
+      .def_readonly("imu_model", &CalibrateOutcome::imu_model, "file of the IMU; empty without one")
       .def_readonly("report", &CalibrateOutcome::report, "its file");
   m.def("calibrate", &calibrate, "recordings"_a, "output"_a, "map"_a = "", "calibration"_a = "",
         "occluders"_a = "", "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{},
-        "replace"_a = false,
-        "What evpose calibrate does: camera, its pose in the body and its clock from recordings before a "
-        "known map, "
-        "written as Kalibr's camera chain");
+        "replace"_a = false, "imu_model"_a = "",
+        "What evpose calibrate does: camera, its pose in the body, its clock and the IMU's axes from "
+        "recordings before a known map, written as Kalibr's files");
   m.def("relocalise", &relocalise, "recording"_a, "init"_a, "init_sigma"_a, "map"_a = "",
         "calibration"_a = "", "occluders"_a = "", "within_s"_a = 1.0, "settings"_a = Settings{},
         "The pose near a rough one (x,y,z,qx,qy,qz,qw[@t_s]; init_sigma: m and deg per axis) that the events "

@@ -224,6 +224,8 @@ void add_unseen(CLI::App& bench, Run& run) {
                                    "folder in which flights stay, and are taken from if they are there");
   command->add_flag("--rebuild-maps", request->rebuild_maps, "build the maps of kept flights anew")
       ->needs(keep);
+  command->add_option("--known", request->known,
+                      "results.jsonl of another run: its seeds are taken from there, and not flown");
   command->add_option("--compare", request->compare, "results.jsonl of another run: differences by seed");
   command->add_flag("--quick", request->quick, "320x240, 1 s and small clouds: to see that it works");
   command->add_option("--threads", request->threads, "seeds at a time; the result is the same for any number")

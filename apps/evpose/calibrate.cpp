@@ -13,11 +13,13 @@ namespace {
 
 void print_calibration(const CalibrateOutcome& outcome, const std::string& output) {
   std::printf("%-8s %12s %10s %14s %10s\n", "", "given", "sigma", "found", "sigma");
-  for (const CalibrationNumber& n : outcome.page.numbers)
-    std::printf("%-8s %12.6g %10.3g %14.8g %10.3g  %s\n", n.name.c_str(), n.given, n.given_sigma, n.found,
-                n.sigma, n.unit.c_str());
+  for (const auto& numbers : {outcome.page.numbers, outcome.page.imu_axes})
+    for (const CalibrationNumber& n : numbers)
+      std::printf("%-8s %12.6g %10.3g %14.8g %10.3g  %s\n", n.name.c_str(), n.given, n.given_sigma, n.found,
+                  n.sigma, n.unit.c_str());
   for (const std::string& words : outcome.page.words) std::printf("note: %s\n", words.c_str());
-  std::printf("%s, %s\n", output.c_str(), outcome.report.c_str());
+  std::printf("%s%s%s, %s\n", output.c_str(), outcome.imu_model.empty() ? "" : ", ",
+              outcome.imu_model.c_str(), outcome.report.c_str());
 }
 
 int run_calibrate(CalibrateRequest request) {
@@ -45,7 +47,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& run) {
   request->track.output = "camchain.yaml";
   command
       ->add_option("-o,--output", request->track.output,
-                   "Kalibr's camera chain; a report is written beside it")
+                   "Kalibr's camera chain; a report and the IMU's axes are written beside it")
       ->capture_default_str();
   command->add_flag("--force", request->track.replace, "replace earlier files of these names");
   command->callback([=, &run] { run = [=] { return run_calibrate(*request); }; });

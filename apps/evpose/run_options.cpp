@@ -13,6 +13,8 @@ void add_input_options(CLI::App& command, TrackRequest& request, const std::stri
   command.add_option(
       calibration, request.calibration,
       "calibration of any kind that evpose info knows; default: the one found with the recording");
+  command.add_option("--imu-model", request.imu_model,
+                     "the IMU's noise and axes as Kalibr writes them; default: the recording's imu.yaml");
   command.add_option("--occluders", request.occluders,
                      "PLY mesh that hides contours behind it; default: the map's own");
   command.add_option("--init", request.init,

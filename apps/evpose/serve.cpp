@@ -47,8 +47,8 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
                           "ros://EVENTS,IMU: topics of ROS");
   command->add_option("--map", track.map, "contours (PLY, PCD, map.h5); default: the recording's own");
   command->add_option("--calibration", track.calibration, "calibration of any kind that evpose info knows");
-  command->add_option("--imu-model", request->imu_model,
-                      "of a source: the IMU's noise, as Kalibr's imu.yaml");
+  command->add_option("--imu-model", track.imu_model,
+                      "the IMU's noise and axes as Kalibr writes them; default: the recording's imu.yaml");
   command->add_option("--occluders", track.occluders, "PLY mesh that hides contours behind it");
   command->add_option("--init", track.init, "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
   command

@@ -53,8 +53,8 @@ Expected<TrackJob> prepare_source(const ServeRequest& request, const RunConfig& 
   recording.T_cam_body = chosen->T_cam_imu.value_or(Pose{});
   recording.last_ns = std::numeric_limits<TimeNs>::max();
   if (calibration->imu_noise) recording.imu_noise = *calibration->imu_noise;
-  if (!request.imu_model.empty()) {
-    const auto noise = read_imu_noise(request.imu_model);
+  if (!track.imu_model.empty()) {
+    const auto noise = read_imu_noise(track.imu_model);
     if (!noise) return noise.error();
     recording.imu_noise = *noise;
   }

@@ -30,10 +30,9 @@ struct ServeConfig {
 void describe(ConfigTable& table, ServeConfig& config);
 
 struct ServeRequest {
-  TrackRequest track;     ///< recording: a recording, or the address of a source; output may be empty
-  std::string imu_model;  ///< of a source: file with the IMU's noise
-  std::string mavlink;    ///< address of a link; empty: none
-  int view = -1;          ///< port of the viewer; -1: none
+  TrackRequest track;   ///< recording: a recording, or the address of a source; output may be empty
+  std::string mavlink;  ///< address of a link; empty: none
+  int view = -1;        ///< port of the viewer; -1: none
 };
 
 Expected<ServeConfig> load_serve_config(const TrackRequest& request);

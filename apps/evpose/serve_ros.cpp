@@ -47,7 +47,7 @@ Error start_ros_node(const ServeRequest& request) {
   const std::pair<const char*, const std::string*> parameters[] = {{"map", &track.map},
                                                                    {"calibration", &track.calibration},
                                                                    {"init", &track.init},
-                                                                   {"imu_model", &request.imu_model},
+                                                                   {"imu_model", &track.imu_model},
                                                                    {"occluders", &track.occluders}};
   for (const auto& [name, value] : parameters)
     if (!value->empty() && *value != "auto") words->push_back("_" + std::string(name) + ":=" + *value);

@@ -220,6 +220,9 @@ class Calibration:
     def numbers(self) -> list[CalibrationNumber]:
         """those of the file, in the file's order"""
     @property
+    def imu_axes(self) -> list[CalibrationNumber]:
+        """scale and misalignment of gyroscope and accelerometer, %; empty without an IMU"""
+    @property
     def correlation(self) -> NDArray[np.float64]:
         """(n, n), of the numbers"""
     @property
@@ -228,6 +231,9 @@ class Calibration:
     @property
     def converged(self) -> bool:
         """the passes have come to rest"""
+    @property
+    def imu_model(self) -> str:
+        """file of the IMU; empty without one"""
     @property
     def report(self) -> str:
         """its file"""
@@ -250,6 +256,7 @@ def track(
     init_sigma: tuple[float, float] = ...,
     settings: dict[str, Any] = {},
     replace: bool = False,
+    imu_model: str | PathLike[str] = '',
 ) -> Run:
     """What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched first"""
 
@@ -263,6 +270,7 @@ def smooth(
     init_sigma: tuple[float, float] = ...,
     settings: dict[str, Any] = {},
     replace: bool = False,
+    imu_model: str | PathLike[str] = '',
 ) -> Run:
     """What evpose smooth does: the trajectory from all data, past and future"""
 
@@ -276,8 +284,9 @@ def calibrate(
     init_sigma: tuple[float, float] = ...,
     settings: dict[str, Any] = {},
     replace: bool = False,
+    imu_model: str | PathLike[str] = '',
 ) -> Calibration:
-    """What evpose calibrate does: camera, its pose in the body and its clock from recordings before a known map, written as Kalibr's camera chain"""
+    """What evpose calibrate does: camera, its pose in the body, its clock and the IMU's axes from recordings before a known map, written as Kalibr's files"""
 
 def relocalise(
     recording: str | PathLike[str],

@@ -62,6 +62,12 @@ class Unseen(unittest.TestCase):
         self.assertEqual(self.files("first"), first)
         self.assertEqual(list((flights / f"quick_flight_000{SEED}").iterdir()), [])
 
+        # Other settings fly it again, unless its result is given.
+        self.made("third", "--known", self.place / "first/results.jsonl", "--set", "rate_hz=200", "--minutes", "1e-9")
+        taken = json.loads((self.place / "third/results.jsonl").read_text())
+        self.assertEqual(taken, line)
+        self.assertIn("1 of the seeds were flown by another program", (self.place / "third/README.md").read_text())
+
     def test_time_that_is_up_begins_no_seed(self):
         self.made("none", "--minutes", "1e-9")
         self.assertEqual((self.place / "none/results.jsonl").read_text(), "")

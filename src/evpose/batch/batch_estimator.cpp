@@ -135,6 +135,7 @@ TrackJob BatchEstimator::at_present_values() const {
   const Calibration& found = parameters_->calibration();
   TrackJob out = job_;
   out.setup.T_body_cam = {found.turn * job_.setup.T_body_cam.q, job_.setup.T_body_cam.p + found.shift};
+  out.setup.imu_noise.axes = parameters_->corrected(job_.setup.imu_noise.axes);
   out.recording.event_options.offset_ns += from_seconds(found.time_offset_s);
   FusionConfig& fusion = out.config.tracker.fusion;
   fusion.gravity_map = so3::exp(tilt_axes(fusion.gravity_map) * found.gravity_tilt_rad) * fusion.gravity_map;
@@ -156,6 +157,7 @@ Expected<std::unique_ptr<Tracker>> BatchEstimator::follow(const Progress& progre
   config.fusion.start_rotation_sigma_rad =
       std::max(config.fusion.start_rotation_sigma_rad, of_passes_.rotation_rad);
   config.event_registration.correlation_time_s *= kLongerCorrelation;
+  if (parameters_->places().imu_axes) config.fusion.imu_scale_sigma = 0;
   const auto make = [&](const FusionConfig& fusion) {
     auto back_end =
         std::make_unique<FollowingBackEnd>(StatePropagator(job.setup.motion, fusion, job.setup.imu_noise),

@@ -47,8 +47,22 @@ void FollowingBackEnd::start(const FusionState& first) {
 
 void FollowingBackEnd::predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) {
   Matrix15d transition;
+  const Eigen::Vector3d gyro_bias = predicted_.gyro_bias, accel_bias = predicted_.accel_bias;
   propagator().propagate(predicted_, a, b, trust, &transition);
+  if (parameters_.places().imu_axes)
+    add_axes(0.5 * (a.gyro + b.gyro) - gyro_bias, 0.5 * (a.accel + b.accel) - accel_bias, transition);
   add_step(transition, to_seconds(b.t - a.t));
+}
+
+/// What is wrong of the axes acts through the readings, as biases do that grow with the motion.
+void FollowingBackEnd::add_axes(const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
+                                const Matrix15d& transition) {
+  by_axes_ = (transition * by_axes_).eval();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) {
+      by_axes_.col(3 * row + column).head<9>() += rate(column) * transition.col(kBg + row).head<9>();
+      by_axes_.col(9 + 3 * row + column).head<9>() += force(column) * transition.col(kBa + row).head<9>();
+    }
 }
 
 void FollowingBackEnd::predict(TimeNs t) {
@@ -81,10 +95,11 @@ void FollowingBackEnd::arrive() {
   Matrix15d turn = Matrix15d::Identity();
   turn.block<3, 3>(kPhi, kPhi) = so3::right_jacobian(difference.segment<3>(kPhi));
   Eigen::MatrixXd by_parameters(15, 0);
-  if (const auto place = parameters_.places().gravity) {
-    by_parameters.setZero(15, *place + 2);
-    by_parameters.rightCols<2>() = turn * by_tilt_;
-  }
+  const StaticParameters::Places& places = parameters_.places();
+  if (places.gravity || places.imu_axes)
+    by_parameters.setZero(15, places.imu_axes ? *places.imu_axes + 18 : *places.gravity + 2);
+  if (places.gravity) by_parameters.middleCols<2>(*places.gravity) = turn * by_tilt_;
+  if (places.imu_axes) by_parameters.middleCols<18>(*places.imu_axes) = turn * by_axes_;
   chain_.move(turn * transition_, turn * difference, turn * noise * turn.transpose(), by_parameters);
   const Eigen::Vector3d angular_rate = predicted_.angular_rate;
   state_ = predicted_ = here;
@@ -92,6 +107,7 @@ void FollowingBackEnd::arrive() {
   predicted_.covariance.setZero();
   transition_.setIdentity();
   by_tilt_.setZero();
+  by_axes_.setZero();
   ++next_;
 }
 

@@ -44,6 +44,7 @@ class FollowingBackEnd final : public BackEnd {
 
  private:
   void add_step(const Matrix15d& transition, double dt_s);
+  void add_axes(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, const Matrix15d& transition);
   void arrive();
   void add_contours(std::span<const ContourOffset> contours);
   Eigen::Vector3d rate_over(std::size_t k, TimeNs to_each_side, double* dt_s) const;
@@ -61,6 +62,7 @@ class FollowingBackEnd final : public BackEnd {
   FusionState predicted_;  ///< its covariance is what the IMU's noise has added
   Matrix15d transition_ = Matrix15d::Identity();
   Eigen::Matrix<double, 15, 2> by_tilt_ = Eigen::Matrix<double, 15, 2>::Zero();
+  Eigen::Matrix<double, 15, 18> by_axes_ = Eigen::Matrix<double, 15, 18>::Zero();
   JointMeasurement measurement_;
   ContourCallback contour_callback_;
   double quick_share_ = 0;

@@ -25,6 +25,7 @@ constexpr int kNumbers = 8, kCalibration = 7 + kNumbers;
 constexpr double kWeight_px2 = 25;  // of a contour: a fifth of a pixel
 constexpr double kImuStep_s = 5e-3, kUpdateStep_s = 1e-2;
 constexpr int kContours = 60;
+constexpr int kAxes = 18;  // of the IMU
 
 FusionConfig settings() {
   FusionConfig config;
@@ -36,19 +37,29 @@ FusionConfig settings() {
   return config;
 }
 
+/// With that sigma of each element; 0: they are ideal and believed.
+StaticParameters parameters_with(double axes_sigma) {
+  ImuAxes axes;
+  axes.gyro_sigma.setConstant(axes_sigma), axes.accel_sigma.setConstant(axes_sigma);
+  using enum StaticParameters::Shared;
+  return axes_sigma > 0 ? StaticParameters(settings(), estimated, axes)
+                        : StaticParameters(settings(), estimated);
+}
+
 class Flight {
  public:
-  Flight(unsigned seed, double duration_s)
-      : random_(seed), duration_s_(duration_s), parameters_(settings(), StaticParameters::Shared::estimated) {
+  Flight(unsigned seed, double duration_s, double axes_sigma = 0)
+      : random_(seed), duration_s_(duration_s), parameters_(parameters_with(axes_sigma)) {
     noise_.gyro_density = 2e-3, noise_.accel_density = 2e-2, noise_.gyro_walk = noise_.accel_walk = 1e-5;
     const FusionConfig config = settings();
     const CalibrationConfig& c = config.calibration;
-    errors_.resize(kCalibration);
+    errors_.resize(parameters_.calibration_size());
     errors_(0) = c.start_time_sigma_s * normal_(random_);
     errors_.segment<3>(1) = c.start_rotation_sigma_rad.x() * draw();
     errors_.segment<3>(4) = c.start_translation_sigma_m.x() * draw();
     for (Eigen::Index i = 0; i < kNumbers; ++i)
       errors_(7 + i) = c.start_intrinsics_sigma(i) * normal_(random_);
+    for (Eigen::Index i = kCalibration; i < errors_.size(); ++i) errors_(i) = axes_sigma * normal_(random_);
     gyro_bias_ = config.start_gyro_bias_sigma_rad_s * draw();
     accel_bias_ = config.start_accel_bias_sigma_m_s2 * draw();
     const StatePropagator propagator(MotionModel::imu, config, noise_);
@@ -74,15 +85,17 @@ class Flight {
     follow.start(start_);
     PixelNoise pixels;  // the same in each pass
     std::size_t next = 1;
+    const ImuAxes axes = parameters_.corrected(ImuAxes());
     for (std::size_t i = 0; i + 1 < imu_.size() && next < trajectory_.size(); ++i) {
-      follow.predict(imu_[i], imu_[i + 1], ImuTrust::good);
+      follow.predict(axes.corrected(imu_[i]), axes.corrected(imu_[i + 1]), ImuTrust::good);
       if (follow.state().t != trajectory_[next].t) continue;
       measure(follow, *camera, T_body_cam, pixels);
       ++next;
     }
     const ParameterSolution found = parameters_.solve(chain.parameters());
-    covariance_ = found.covariance.topLeftCorner(kCalibration, kCalibration);
-    const Eigen::VectorXd z = found.z.head(kCalibration);
+    const Eigen::Index n = parameters_.calibration_size();
+    covariance_ = found.covariance.topLeftCorner(n, n);
+    const Eigen::VectorXd z = found.z.head(n);
     const auto smoothed = chain.smooth(found.z, found.covariance);
     for (std::size_t k = 0; k < smoothed.size(); ++k) {
       trajectory_[k].add(smoothed[k].mean);
@@ -95,7 +108,12 @@ class Flight {
   Eigen::VectorXd calibration_error() const { return parameters_.calibration_errors() - errors_; }
   double calibration_nees() const {
     const Eigen::VectorXd e = calibration_error();
-    return e.dot(covariance_.ldlt().solve(e)) / kCalibration;
+    return e.dot(covariance_.ldlt().solve(e)) / static_cast<double>(e.size());
+  }
+  /// Of the IMU's axes alone.
+  double axes_nees() const {
+    const Eigen::VectorXd e = calibration_error().tail<kAxes>();
+    return e.dot(covariance_.bottomRightCorner<kAxes, kAxes>().ldlt().solve(e)) / kAxes;
   }
   /// Mean over the flight, of pose and velocity.
   double state_nees() const {
@@ -124,6 +142,11 @@ class Flight {
                  accel = noise_.accel_density / std::sqrt(kImuStep_s);
     for (int i = 0; i * kImuStep_s < duration_s_ + kImuStep_s; ++i) {
       ImuSample s = imu_at(i * kImuStep_s);
+      if (errors_.size() > kCalibration) {
+        using RowMajor3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+        s.gyro += Eigen::Map<const RowMajor3d>(&errors_(kCalibration)) * Eigen::Vector3d(s.gyro);
+        s.accel += Eigen::Map<const RowMajor3d>(&errors_(kCalibration + 9)) * Eigen::Vector3d(s.accel);
+      }
       s.gyro += gyro_bias_ + gyro * draw();
       s.accel += accel_bias_ + accel * draw();
       imu_.push_back(s);
@@ -160,7 +183,7 @@ class Flight {
         to_seconds(state.t - kStart_ns) + errors_(0) - parameters_.calibration().time_offset_s;
     const Pose true_mount{so3::exp(errors_.segment<3>(1)) * given_.q, given_.p + errors_.segment<3>(4)};
     const Pose T_map_cam = pose_at(seen_s) * true_mount;
-    const auto seen_by = *make_camera(corrected(kGiven, errors_.tail(kNumbers)));
+    const auto seen_by = *make_camera(corrected(kGiven, errors_.segment<kNumbers>(7)));
     const Pose& at = state.nav.T_map_body;
     PoseInformation sum;
     std::vector<ContourOffset> offsets;
@@ -215,6 +238,28 @@ TEST(FollowingBackEnd, CalibrationAndTrajectoryAreFoundUnderTheirStatedSigma) {
   }
   EXPECT_NEAR(calibration, 1, 0.3);
   EXPECT_NEAR(state, 1, 0.3);
+}
+
+TEST(FollowingBackEnd, AxesOfTheImuAreFoundUnderTheirStatedSigma) {
+  constexpr int kRuns = 10;
+  constexpr double kSigma = 0.02;
+  double axes = 0, calibration = 0, state = 0;
+  Eigen::VectorXd left = Eigen::VectorXd::Zero(kAxes);  // of the sigma
+  for (unsigned run = 0; run < kRuns; ++run) {
+    Flight flight(300 + run, 2, kSigma);
+    double change = 1;
+    for (int pass = 0; pass < 5; ++pass) change = flight.iterate();
+    EXPECT_LT(change, 0.1);
+    axes += flight.axes_nees() / kRuns;
+    calibration += flight.calibration_nees() / kRuns;
+    state += flight.state_nees() / kRuns;
+    left += flight.covariance().diagonal().tail<kAxes>().cwiseSqrt() / (kSigma * kRuns);
+  }
+  EXPECT_NEAR(axes, 1, 0.3);
+  EXPECT_NEAR(calibration, 1, 0.3);
+  EXPECT_NEAR(state, 1, 0.3);
+  EXPECT_LT(left.minCoeff(), 0.6);  // what the motion tells best
+  EXPECT_LE(left.maxCoeff(), 1 + 1e-9);
 }
 
 TEST(FollowingBackEnd, MoreFlightTellsMore) {

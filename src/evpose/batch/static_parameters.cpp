@@ -7,8 +7,36 @@
 #include <utility>
 
 namespace evpose {
+namespace {
 
-StaticParameters::StaticParameters(const FusionConfig& config, Shared shared) : shared_(shared) {
+using RowMajor3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// Row by row, of gyroscope and accelerometer.
+Eigen::VectorXd elements(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel) {
+  Eigen::VectorXd out(18);
+  Eigen::Map<RowMajor3d>(out.data()) = gyro;
+  Eigen::Map<RowMajor3d>(out.data() + 9) = accel;
+  return out;
+}
+
+Eigen::VectorXd axes_sigma(const ImuAxes& axes, double otherwise) {
+  const auto stated = [&](const Eigen::Matrix3d& sigma) -> Eigen::Matrix3d {
+    return sigma.minCoeff() < 0 ? Eigen::Matrix3d::Constant(otherwise) : sigma;
+  };
+  return elements(stated(axes.gyro_sigma), stated(axes.accel_sigma));
+}
+
+}  // namespace
+
+StaticParameters::StaticParameters(const FusionConfig& config, Shared shared)
+    : StaticParameters(config, shared, Eigen::VectorXd()) {}
+
+StaticParameters::StaticParameters(const FusionConfig& config, Shared shared, const ImuAxes& imu)
+    : StaticParameters(config, shared, axes_sigma(imu, config.imu_scale_sigma)) {}
+
+StaticParameters::StaticParameters(const FusionConfig& config, Shared shared,
+                                   const Eigen::VectorXd& imu_axes_sigma)
+    : shared_(shared), imu_axes_sigma_(imu_axes_sigma) {
   const CalibrationConfig& c = config.calibration;
   std::vector<double> sigmas;
   const auto add = [&](bool asked, std::optional<int>* place, const Eigen::VectorXd& sigma) {
@@ -21,6 +49,8 @@ StaticParameters::StaticParameters(const FusionConfig& config, Shared shared) : 
   add(c.translation, &places_.translation, c.start_translation_sigma_m);
   add(c.gravity, &places_.gravity, Eigen::VectorXd::Constant(2, c.start_gravity_sigma_rad));
   add(c.intrinsics, &places_.intrinsics, c.start_intrinsics_sigma);
+  add(imu_axes_sigma.size() > 0, &places_.imu_axes, imu_axes_sigma);
+  imu_axes_.setZero(imu_axes_sigma.size());
   intrinsics_count_ = c.intrinsics ? c.start_intrinsics_sigma.size() : 0;
   state_prior(c, sigmas);
   found_.intrinsics.setZero(intrinsics_count_);
@@ -73,6 +103,20 @@ Eigen::VectorXd StaticParameters::calibration_errors() const {
   if (places_.translation) out.segment<3>(*places_.translation) = found_.shift;
   if (places_.gravity) out.segment<2>(*places_.gravity) = found_.gravity_tilt_rad;
   if (places_.intrinsics) out.segment(*places_.intrinsics, intrinsics_count_) = found_.intrinsics;
+  if (places_.imu_axes) out.segment<18>(*places_.imu_axes) = imu_axes_;
+  return out;
+}
+
+ImuAxes StaticParameters::corrected(const ImuAxes& given) const {
+  ImuAxes out = given;
+  if (!places_.imu_axes) return out;
+  const auto matrix = [](const Eigen::VectorXd& values, Eigen::Index first) -> Eigen::Matrix3d {
+    return Eigen::Map<const RowMajor3d>(values.data() + first);
+  };
+  out.gyro += given.gyro * matrix(imu_axes_, 0);
+  out.accel += given.accel * matrix(imu_axes_, 9);
+  out.gyro_sigma = matrix(imu_axes_sigma_, 0);
+  out.accel_sigma = matrix(imu_axes_sigma_, 9);
   return out;
 }
 
@@ -142,6 +186,7 @@ void StaticParameters::add(const Calibration& found) {
   set(places_.translation, found.shift_sigma_m);
   set(places_.gravity, found.gravity_sigma_rad);
   set(places_.intrinsics, found.intrinsics_sigma);
+  set(places_.imu_axes, imu_axes_sigma_);
   correct({z, covariance});
 }
 
@@ -168,6 +213,10 @@ void StaticParameters::correct(const ParameterSolution& solution) {
   if (const auto at = places_.intrinsics) {
     found_.intrinsics += z.segment(*at, intrinsics_count_);
     found_.intrinsics_sigma = sigma.segment(*at, intrinsics_count_);
+  }
+  if (const auto at = places_.imu_axes) {
+    imu_axes_ += z.segment<18>(*at);
+    imu_axes_sigma_ = sigma.segment<18>(*at);
   }
   for (Segment& s : segments_) s.offset_m += z(s.place);
 }

@@ -9,6 +9,7 @@
 #include "evpose/batch/chain_smoother.h"
 #include "evpose/fusion/back_end.h"
 #include "evpose/fusion/shared_errors.h"
+#include "evpose/imu/imu.h"
 
 namespace evpose {
 
@@ -19,22 +20,27 @@ struct ParameterSolution {
 };
 
 /// What does not change over the recordings and is estimated with the trajectories: errors of the
-/// calibration, offsets of map segments and, where it is asked for, errors that all contours share
-/// (SharedErrors). Each has a place among the parameters of the ChainSmoother, a present value about which
-/// everything is linearised, and a prior about what was given, which stays whatever the present value. What
-/// is measured does not depend on the value of the shared errors, so theirs stays zero and each pass finds
-/// them anew.
+/// calibration, offsets of map segments and, where it is asked for, of the IMU's axes, and errors that all
+/// contours share (SharedErrors). Each has a place among the parameters of the ChainSmoother, a present value
+/// about which everything is linearised, and a prior about what was given, which stays whatever the present
+/// value. What is measured does not depend on the value of the shared errors, so theirs stays zero and each
+/// pass finds them anew.
 class StaticParameters {
  public:
   /// What to make of errors that all contours share.
   enum class Shared { left_out, estimated };
   /// As a resolved FusionConfig asks for them.
   explicit StaticParameters(const FusionConfig& config, Shared shared = Shared::left_out);
+  /// `imu`: with the sigmas of its axes, which become parameters; those that are not stated are the config's.
+  StaticParameters(const FusionConfig& config, Shared shared, const ImuAxes& imu);
 
   int size() const { return size_; }
   /// First place of each; none: it is believed.
   struct Places {
     std::optional<int> time, rotation, translation, gravity, intrinsics;
+    /// 18: elements (row by row) of the gyroscope's, then the accelerometer's E, where the axes are the given
+    /// ones times I + E.
+    std::optional<int> imu_axes;
     int shared = 0;  ///< after the calibration
   };
   const Places& places() const { return places_; }
@@ -66,6 +72,8 @@ class StaticParameters {
 
   /// The present values, as differences from what was given, with their sigmas.
   const Calibration& calibration() const { return found_; }
+  /// The given axes of the IMU with what was found of them, and their sigmas.
+  ImuAxes corrected(const ImuAxes& given) const;
   /// What is known without the recordings, about the present values.
   ParameterInformation prior() const;
   /// The parameters by the prior and by what recordings say of them, about the present values. `trust`:
@@ -77,7 +85,7 @@ class StaticParameters {
   void add(const Calibration& found);
   /// The values change by the solution.
   void correct(const ParameterSolution& solution);
-  /// Present values minus given ones: calibration only, in the order of the places.
+  /// Present values minus given ones: of the calibration and the IMU's axes, in the order of the places.
   Eigen::VectorXd calibration_errors() const;
   /// Of what was given, in the order of the places.
   const Eigen::VectorXd& given_sigma() const { return given_sigma_; }
@@ -86,6 +94,7 @@ class StaticParameters {
   Eigen::MatrixXd calibration_correlation(Eigen::Index n, bool with_imu) const;
 
  private:
+  StaticParameters(const FusionConfig& config, Shared shared, const Eigen::VectorXd& imu_axes_sigma);
   void state_prior(const CalibrationConfig& config, const std::vector<double>& sigmas);
 
   Shared shared_;
@@ -96,6 +105,7 @@ class StaticParameters {
   Eigen::Index intrinsics_count_ = 0;
   int calibration_size_ = 0, size_ = 0;
   Calibration found_;
+  Eigen::VectorXd imu_axes_, imu_axes_sigma_;  ///< E; empty: believed
   Eigen::MatrixXd calibration_covariance_;
   std::vector<Segment> segments_;
   std::unordered_map<std::uint32_t, std::size_t> segment_of_number_;

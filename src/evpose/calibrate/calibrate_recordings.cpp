@@ -188,6 +188,9 @@ CalibrationPage page_of(const JointCalibration& joint, const RunCalibration& cal
                        first.recording.has_imu ? "" : ", no IMU: the camera alone is calibrated");
   page.size = first.recording.camera.size;
   page.numbers = numbers_of(calibration);
+  if (const auto imu = joint.imu())
+    page.imu_axes =
+        axes_numbers(first.setup.imu_noise.axes, imu->axes, first.config.tracker.fusion.imu_scale_sigma);
   page.correlation = *calibration.found.sigma.correlation;
   const auto found = make_camera(*calibration.found.intrinsics);
   if (found) page.before = model_difference(*first.setup.camera, **found);
@@ -241,8 +244,14 @@ std::string report_path(const std::string& chain) {
   return std::filesystem::path(chain).replace_extension(".html").string();
 }
 
+/// camchain.yaml: camchain-imu.yaml.
+std::string imu_path(const std::string& chain) {
+  const std::filesystem::path path(chain);
+  return path.parent_path() / (path.stem().string() + "-imu.yaml");
+}
+
 Status check_output(const TrackRequest& request) {
-  for (const std::string& path : {request.output, report_path(request.output)})
+  for (const std::string& path : {request.output, report_path(request.output), imu_path(request.output)})
     if (!request.replace && std::filesystem::exists(path))
       return Error{path, "exists", "give another name with -o, or --force"};
   return {};
@@ -296,6 +305,10 @@ Expected<std::optional<CalibrateOutcome>> calibrate_recordings(const CalibrateRe
   if (!refuted.empty()) out.page.words.insert(out.page.words.begin(), refuted);
   out.report = report_path(request.track.output);
   if (auto ok = write_kalibr_camera(request.track.output, found->calibration.found); !ok) return ok.error();
+  if (const auto imu = found->joint->imu()) {
+    out.imu_model = imu_path(request.track.output);
+    if (auto ok = write_kalibr_imu(out.imu_model, *imu); !ok) return ok.error();
+  }
   if (auto ok = write_text_file(out.report, calibration_page(out.page)); !ok) return ok.error();
   return std::optional<CalibrateOutcome>(std::move(out));
 }

@@ -18,13 +18,15 @@ struct CalibrateRequest {
 };
 
 struct CalibrateOutcome {
-  CalibrationPage page;  ///< all that was found
-  std::string report;    ///< path
+  CalibrationPage page;   ///< all that was found
+  std::string report;     ///< path
+  std::string imu_model;  ///< path; empty: no IMU
   bool converged = false;
 };
 
-/// Calibrates a camera, and where there is an IMU how it is mounted and its time offset, from recordings
-/// before a known map: writes Kalibr's camera chain with sigmas and correlations, and a report. Nothing is
+/// Calibrates a camera, and where there is an IMU how it is mounted and its time offset and its axes, from
+/// recordings before a known map: writes Kalibr's camera chain with sigmas and correlations, Kalibr's file of
+/// the IMU, and a report. Nothing is
 /// written on error; an interrupted run writes nothing, and the outcome is empty.
 Expected<std::optional<CalibrateOutcome>> calibrate_recordings(const CalibrateRequest& request);
 

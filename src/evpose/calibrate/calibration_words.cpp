@@ -72,7 +72,19 @@ std::string remedy_of(const std::string& name, const FlightMotion& motion) {
               " axis alone");
 }
 
+/// One sentence for all elements of a sensor's axes that are not told.
+void add_untold_axes(const CalibrationPage& page, const char* sensor, const char* remedy,
+                     std::vector<std::string>& out) {
+  std::string names;
+  for (const CalibrationNumber& n : page.imu_axes)
+    if (n.name.starts_with(sensor) && !is_told(n)) names += (names.empty() ? "" : ", ") + n.name;
+  if (!names.empty()) out.push_back(text("the motion does not tell ", names, " (IMU's axes); ", remedy));
+}
+
 void add_untold(const CalibrationPage& page, std::vector<std::string>& out) {
+  add_untold_axes(page, "gyro", "turn fast about all three axes, to and fro", out);
+  add_untold_axes(page, "accel", "bring each axis to the vertical, both ways up, or accelerate hard along it",
+                  out);
   for (const CalibrationNumber& n : page.numbers)
     if (!is_told(n))
       out.push_back(text("the motion does not tell ", n.name, ": it is known to ", n.sigma, " ", n.unit,
@@ -121,6 +133,27 @@ std::vector<CalibrationNumber> numbers_of(const RunCalibration& calibration) {
   for (std::size_t i = 0; i < names.size(); ++i)
     out.push_back({names[i], i < 4 ? "px" : "", from[i], from_sigma[i], to[i], to_sigma[i]});
   if (found.T_cam_imu) add_mounting(given, found, out);
+  return out;
+}
+
+std::vector<CalibrationNumber> axes_numbers(const ImuAxes& given, const ImuAxes& found, double sigma) {
+  constexpr double kPercent = 100;
+  std::vector<CalibrationNumber> out;
+  const std::array<char, 3> axes{'x', 'y', 'z'};
+  const auto add = [&](const char* sensor, const Eigen::Matrix3d& from, const Eigen::Matrix3d& from_sigma,
+                       const Eigen::Matrix3d& to, const Eigen::Matrix3d& to_sigma) {
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column) {
+        const double ideal = row == column ? 1 : 0;
+        const double before = from_sigma.minCoeff() < 0 ? sigma : from_sigma(row, column);
+        out.push_back({text(sensor, " ", axes.at(static_cast<std::size_t>(row)),
+                            axes.at(static_cast<std::size_t>(column))),
+                       "%", kPercent * (from(row, column) - ideal), kPercent * before,
+                       kPercent * (to(row, column) - ideal), kPercent * to_sigma(row, column)});
+      }
+  };
+  add("gyro", given.gyro, given.gyro_sigma, found.gyro, found.gyro_sigma);
+  add("accel", given.accel, given.accel_sigma, found.accel, found.accel_sigma);
   return out;
 }
 

@@ -103,6 +103,14 @@ Eigen::MatrixXd JointCalibration::correlation() const {
                                               jobs_.front().recording.has_imu);
 }
 
+std::optional<ImuNoise> JointCalibration::imu() const {
+  const TrackJob& job = jobs_.front();
+  if (!job.recording.has_imu) return {};
+  ImuNoise out = job.setup.imu_noise;
+  out.axes = parameters_->corrected(out.axes);
+  return out;
+}
+
 /// The parameters, at values that the filter can begin with.
 Status JointCalibration::begin_parameters() {
   const TrackJob& job = jobs_.front();
@@ -115,7 +123,10 @@ Status JointCalibration::begin_parameters() {
     coarse->intrinsics = board_->intrinsics;
     coarse->intrinsics_sigma = board_->intrinsics_sigma;
   }
-  parameters_ = std::make_shared<StaticParameters>(*fusion, StaticParameters::Shared::estimated);
+  using enum StaticParameters::Shared;
+  parameters_ = job.recording.has_imu
+                    ? std::make_shared<StaticParameters>(*fusion, estimated, job.setup.imu_noise.axes)
+                    : std::make_shared<StaticParameters>(*fusion, estimated);
   parameters_->add(*coarse);
   log_detail(text("coarse: ", values_words(*parameters_)));
   return {};

@@ -37,6 +37,8 @@ class JointCalibration {
   bool converged() const { return converged_; }
 
   const Calibration& found() const { return parameters_->calibration(); }
+  /// The IMU with the axes that were found; none without one.
+  std::optional<ImuNoise> imu() const;
   /// As CalibrationSigma::correlation.
   Eigen::MatrixXd correlation() const;
   /// By how many given sigmas what the events alone say is off what was given, in the order of

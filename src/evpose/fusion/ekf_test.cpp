@@ -33,7 +33,7 @@ TEST(Ekf, CovarianceGrowsAsDifferencesOfTheStrapdownSay) {
   FusionConfig config;
   config.imu_noise_scale = 1e-2;
   config.imu_scale_sigma = 0;
-  const ImuNoise silent{0, 0, 0, 0, 1000};
+  const ImuNoise silent{0, 0, 0, 0, 1000, {}};
   const ImuSample a = sample(0), b = sample(5 * kNsPerMs);
   const auto perturbed_run = [&](int i, double h) {
     Vector15d d = Vector15d::Zero();

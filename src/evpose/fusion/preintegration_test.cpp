@@ -119,7 +119,7 @@ TEST(Preintegration, ResidualVanishesAtThePrediction) {
 }
 
 TEST(Preintegration, CovarianceIsThatOfAThousandNoisyRuns) {
-  const ImuNoise noise{0.02, 0.05, 0.004, 0.01, 500};
+  const ImuNoise noise{0.02, 0.05, 0.004, 0.01, 500, {}};
   const TimeNs dt = 2 * kNsPerMs;
   const double dt_s = to_seconds(dt);
   const int steps = 100, runs = 1000;

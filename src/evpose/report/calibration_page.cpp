@@ -77,10 +77,10 @@ std::string draw_radius(const std::vector<RadiusBin>& bins) {
          "<span style='color:#d1495b'>Red</span>: root mean square across the contours.</p>";
 }
 
-std::string numbers_table(const CalibrationPage& page) {
+std::string numbers_table(const std::vector<CalibrationNumber>& numbers) {
   std::string out =
       "<table><tr><th>number<th>given<th>its sigma<th>found<th>sigma<th>change, in given sigmas</tr>";
-  for (const CalibrationNumber& n : page.numbers)
+  for (const CalibrationNumber& n : numbers)
     out += formatted(
         "<tr><td>%s%s%s<td>%.6g<td>%.3g<td>%.6g<td>%.3g<td>%s</tr>", n.name.c_str(),
         n.unit.empty() ? "" : ", ", n.unit.c_str(), n.given, n.given_sigma, n.found, n.sigma,
@@ -128,7 +128,10 @@ std::string calibration_page(const CalibrationPage& page) {
                     "svg{width:100%;height:auto;border:1px solid #ddd}</style><h1>" +
                     escaped_html(page.title) + "</h1><p>" + escaped_html(page.subtitle) + "</p><ul>";
   for (const std::string& words : page.words) out += "<li>" + escaped_html(words);
-  out += "</ul><h2>Numbers</h2>" + numbers_table(page);
+  out += "</ul><h2>Numbers</h2>" + numbers_table(page.numbers);
+  if (!page.imu_axes.empty())
+    out += "<h2>Axes of the IMU</h2><p>Scale (xx, yy, zz) and misalignment: what an axis reads of each.</p>" +
+           numbers_table(page.imu_axes);
   out +=
       "<h2>The given calibration beside the found one</h2><p>By how much the given one sees things "
       "elsewhere, after the turn of the camera that fits best.</p>" +

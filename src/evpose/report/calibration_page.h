@@ -43,11 +43,12 @@ struct CalibrationPage {
   std::string title, subtitle;
   ImageSize size;
   std::vector<CalibrationNumber> numbers;
-  Eigen::MatrixXd correlation;     ///< of the numbers; empty: not known
-  std::vector<std::string> words;  ///< what was told and what was not
-  std::vector<FieldArrow> before;  ///< by which the given calibration sees things elsewhere
-  std::vector<FieldArrow> after;   ///< of events from contours, with the found one
-  std::vector<RadiusBin> radius;   ///< likewise
+  std::vector<CalibrationNumber> imu_axes;  ///< scale and misalignment; empty: no IMU
+  Eigen::MatrixXd correlation;              ///< of the numbers; empty: not known
+  std::vector<std::string> words;           ///< what was told and what was not
+  std::vector<FieldArrow> before;           ///< by which the given calibration sees things elsewhere
+  std::vector<FieldArrow> after;            ///< of events from contours, with the found one
+  std::vector<RadiusBin> radius;            ///< likewise
   std::vector<FlightMotion> flights;
 };
 

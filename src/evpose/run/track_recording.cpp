@@ -11,6 +11,7 @@
 
 #include "evpose/camera/adjusted_camera.h"
 #include "evpose/core/log.h"
+#include "evpose/io/calibration/kalibr.h"
 #include "evpose/io/files/config_yaml.h"
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/map_h5.h"
@@ -207,8 +208,13 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
 }
 
 Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config) {
-  const auto recording = open_recording(request.recording, request.calibration);
+  auto recording = open_recording(request.recording, request.calibration);
   if (!recording) return recording.error();
+  if (!request.imu_model.empty()) {
+    const auto imu = read_imu_noise(request.imu_model);
+    if (!imu) return imu.error();
+    recording->imu_noise = *imu;
+  }
   std::vector<TimedPose> truth;
   if (!recording->groundtruth_path.empty()) {
     auto read = read_groundtruth(*recording);

@@ -26,6 +26,7 @@ void describe(ConfigTable& table, RunConfig& config);
 struct TrackRequest {
   std::string recording;                 ///< folder or file
   std::string calibration;               ///< file; empty: the one found with the recording
+  std::string imu_model;                 ///< file; empty: the recording's own, or the calibration's
   std::string map;                       ///< file; empty: the recording's own
   std::string occluders;                 ///< mesh file; empty: those of the map, if any
   std::string init = "auto";             ///< see start.h

@@ -280,7 +280,7 @@ class AgreementLaws : public ::testing::Test {
   void run(double late_s, double scale, const Eigen::Vector3d& bias, bool absorb) {
     ImuAgreement agreement;
     const Eigen::Vector3d gravity(0, 0, -9.81);
-    const ImuNoise noise{.accel_density = 3e-3, .gyro_density = 6e-4};
+    const ImuNoise noise{.accel_density = 3e-3, .gyro_density = 6e-4, .axes = {}};
     Eigen::Vector3d velocity(1, -2, 0.5);
     FusionState state;
     state.covariance.diagonal().segment<3>(error_state::kPhi).setConstant(rotation_sigma_ * rotation_sigma_);

@@ -109,7 +109,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
 }
 
 void Tracker::add_imu(const ImuSample& sample) {
-  imu_rate_output_.add(imu_.add(sample, fusion_->state().t));
+  imu_rate_output_.add(imu_.add(setup_.imu_noise.axes.corrected(sample), fusion_->state().t));
   imu_rate_output_.report_until(imu_time(next_update_), *fusion_, imu_);
   make_due_updates();
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double kLongestShift_s = 1e6, kDegree = M_PI / 180;
 constexpr double kLongestGap_s = 10;
+constexpr double kLargestFault = 0.5;  // of an element of an IMU's axes
 
 /// Kalibr's camera models: how many of their numbers stand before fu, fv, pu, pv.
 std::size_t leading_numbers(const std::string& model) {
@@ -198,13 +200,61 @@ Status read_placement(const YamlDocument& document, const YamlNode& node, const 
   return {};
 }
 
+Expected<Eigen::Matrix3d> read_matrix(const YamlDocument& document, const YamlNode& node, const char* key) {
+  const auto values = required_numbers(document, node, key, 9);
+  if (!values) return values.error();
+  return Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values->data()));
+}
+
+/// Scale and misalignment of one sensor, near to none.
+Status read_axes_matrix(const YamlDocument& document, const YamlNode& sensor, Eigen::Matrix3d* M,
+                        Eigen::Matrix3d* sigma) {
+  const auto read = read_matrix(document, sensor, "M");
+  if (!read) return read.error();
+  if (!((*read - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kLargestFault))
+    return document.error(*sensor.find("M"), "M: is no matrix near the identity",
+                          "give the one that Kalibr found");
+  *M = *read;
+  const auto stated = read_sigmas(document, sensor, "M_sigma", {9});
+  if (!stated) return stated.error();
+  if (!stated->empty()) *sigma = *read_matrix(document, sensor, "M_sigma");
+  return {};
+}
+
+/// Of Kalibr's models calibrated (ideal axes) and scale-misalignment.
+Expected<ImuAxes> kalibr_axes(const YamlDocument& document, const YamlNode& imu) {
+  ImuAxes axes;
+  const YamlNode* model = imu.find("model");
+  if (model == nullptr || !model->scalar.starts_with("scale-misalignment")) return axes;
+  if (model->scalar != "scale-misalignment")
+    return document.error(*model, "model '" + model->scalar + "' is not supported",
+                          "calibrate with model calibrated or scale-misalignment");
+  const auto accel = required(document, imu, "accelerometers"), gyro = required(document, imu, "gyroscopes");
+  if (!accel) return accel.error();
+  if (!gyro) return gyro.error();
+  if (auto ok = read_axes_matrix(document, **accel, &axes.accel, &axes.accel_sigma); !ok) return ok.error();
+  if (auto ok = read_axes_matrix(document, **gyro, &axes.gyro, &axes.gyro_sigma); !ok) return ok.error();
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  if (const YamlNode* at = (*gyro)->find("C_gyro_i")) {
+    const auto read = read_matrix(document, **gyro, "C_gyro_i");
+    if (!read) return read.error();
+    constexpr double kRounding = 1e-3;
+    if (!((*read * read->transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRounding) ||
+        read->determinant() < 0)
+      return document.error(*at, "C_gyro_i: is no rotation", "give the one that Kalibr found");
+    turn = *read;
+  }
+  axes.gyro = axes.gyro * turn;
+  if ((*gyro)->find("A") == nullptr) return axes;
+  const auto by_force = read_matrix(document, **gyro, "A");
+  if (!by_force) return by_force.error();
+  axes.gyro_by_force = *by_force * turn;
+  return axes;
+}
+
 }  // namespace
 
 Expected<ImuNoise> kalibr_noise(const YamlDocument& document, const YamlNode& imu) {
-  if (const YamlNode* model = imu.find("model");
-      model != nullptr && model->scalar.starts_with("scale-misalignment"))
-    return document.error(*model, "model '" + model->scalar + "' is not supported",
-                          "calibrate with model calibrated");
   ImuNoise noise;
   const std::pair<const char*, double*> values[] = {{"accelerometer_noise_density", &noise.accel_density},
                                                     {"accelerometer_random_walk", &noise.accel_walk},
@@ -219,6 +269,9 @@ Expected<ImuNoise> kalibr_noise(const YamlDocument& document, const YamlNode& im
                             "give Kalibr's value");
     *target = *value;
   }
+  const auto axes = kalibr_axes(document, imu);
+  if (!axes) return axes.error();
+  noise.axes = *axes;
   return noise;
 }
 

@@ -21,6 +21,17 @@ std::string list(const std::vector<double>& values) {
   return out + "]";
 }
 
+std::string matrix(const std::string& key, const Eigen::Matrix3d& M) {
+  std::string out = "  " + key + ":\n";
+  for (int r = 0; r < 3; ++r) out += "  - " + list({M(r, 0), M(r, 1), M(r, 2)}) + "\n";
+  return out;
+}
+
+/// Nothing where they are not stated.
+std::string sigmas(const Eigen::Matrix3d& sigma) {
+  return sigma.minCoeff() < 0 ? "" : matrix("M_sigma", sigma);
+}
+
 }  // namespace
 
 Status write_kalibr_camera(const std::string& path, const CalibratedCamera& camera) {
@@ -70,11 +81,18 @@ Expected<ImuNoise> read_imu_noise(const std::string& path) {
 }
 
 Status write_kalibr_imu(const std::string& path, const ImuNoise& noise) {
-  return write_text_file(path, "accelerometer_noise_density: " + exact(noise.accel_density) +
-                                   "\naccelerometer_random_walk: " + exact(noise.accel_walk) +
-                                   "\ngyroscope_noise_density: " + exact(noise.gyro_density) +
-                                   "\ngyroscope_random_walk: " + exact(noise.gyro_walk) +
-                                   "\nupdate_rate: " + exact(noise.rate_hz) + "\n");
+  std::string out = "accelerometer_noise_density: " + exact(noise.accel_density) +
+                    "\naccelerometer_random_walk: " + exact(noise.accel_walk) +
+                    "\ngyroscope_noise_density: " + exact(noise.gyro_density) +
+                    "\ngyroscope_random_walk: " + exact(noise.gyro_walk) +
+                    "\nupdate_rate: " + exact(noise.rate_hz) + "\n";
+  const ImuAxes& axes = noise.axes;
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
+  if (!axes.are_ideal())
+    out += "model: scale-misalignment\naccelerometers:\n" + matrix("M", axes.accel) +
+           sigmas(axes.accel_sigma) + "gyroscopes:\n" + matrix("M", axes.gyro) + sigmas(axes.gyro_sigma) +
+           matrix("A", axes.gyro_by_force) + matrix("C_gyro_i", none);
+  return write_text_file(path, out);
 }
 
 }  // namespace evpose

@@ -18,9 +18,11 @@ namespace evpose {
 /// word in kTrailFilters) and trail_filter_gap (s).
 Status write_kalibr_camera(const std::string& path, const CalibratedCamera& camera);
 
-/// The noise of any calibration file that has one. Errors name the line: missing or non-positive values, a
-/// model with scale and misalignment.
+/// The IMU's noise and axes of any calibration file that has them. Errors name the line: missing or
+/// non-positive values, a model other than calibrated and scale-misalignment, axes far from ideal.
 Expected<ImuNoise> read_imu_noise(const std::string& path);
+/// With the model scale-misalignment unless the axes are ideal; their sigmas beside it as M_sigma. C_gyro_i
+/// is in the gyroscope's M.
 Status write_kalibr_imu(const std::string& path, const ImuNoise& noise);
 
 }  // namespace evpose

@@ -187,7 +187,7 @@ TEST(Kalibr, ErrorsNameTheLine) {
 
 TEST(Kalibr, ImuModelInBothShapes) {
   const TemporaryFolder folder;
-  const ImuNoise noise{1e-3, 2e-4, 3e-4, 4e-5, 500};
+  const ImuNoise noise{1e-3, 2e-4, 3e-4, 4e-5, 500, {}};
   ASSERT_TRUE(write_kalibr_imu(folder / "imu.yaml", noise).ok());
   const std::string plain = content_of(folder / "imu.yaml");
   std::string nested = "imu0:\n";
@@ -207,7 +207,44 @@ TEST(Kalibr, ImuModelInBothShapes) {
   };
   EXPECT_TRUE(says(line(replaced(plain, "0.001", "0")), {"i.yaml:1", "not positive"}));
   EXPECT_TRUE(says(line(replaced(plain, "update_rate", "rate")), {"i.yaml:1", "update_rate"}));
-  EXPECT_TRUE(says(line(plain + "model: scale-misalignment\n"), {"i.yaml:6", "scale-misalignment"}));
+  EXPECT_TRUE(says(line(plain + "model: scale-misalignment-size-effect\n"), {"i.yaml:6", "size-effect"}));
+  EXPECT_TRUE(says(line(plain + "model: scale-misalignment\n"), {"accelerometers"}));
+}
+
+TEST(Kalibr, AxesOfAnImuAreReadAsTheyAreWritten) {
+  const TemporaryFolder folder;
+  ImuNoise noise;
+  noise.axes.gyro << 1.01, 0.002, -0.003, 0.004, 0.99, 0.005, -0.006, 0.007, 1.02;
+  noise.axes.accel << 0.98, 0, 0, 0.001, 1.03, 0, -0.002, 0.003, 1;
+  noise.axes.gyro_by_force << 1e-4, 0, 2e-4, 0, -1e-4, 0, 0, 0, 3e-4;
+  noise.axes.accel_sigma.setConstant(1e-3);
+  ASSERT_TRUE(write_kalibr_imu(folder / "imu.yaml", noise).ok());
+  const auto again = read_imu_noise(folder / "imu.yaml");
+  ASSERT_TRUE(again.ok()) << error_line(again);
+  EXPECT_EQ(again->axes.gyro, noise.axes.gyro);
+  EXPECT_EQ(again->axes.accel, noise.axes.accel);
+  EXPECT_EQ(again->axes.gyro_by_force, noise.axes.gyro_by_force);
+  EXPECT_EQ(again->axes.accel_sigma, noise.axes.accel_sigma);
+  EXPECT_LT(again->axes.gyro_sigma.maxCoeff(), 0);
+
+  // As Kalibr splits them: M C_gyro_i, A C_gyro_i.
+  const std::string written = content_of(folder / "imu.yaml");
+  const std::string turned = written.substr(0, written.find("  C_gyro_i")) +
+                             "  C_gyro_i:\n  - [0.8, 0.6, 0.0]\n  - [-0.6, 0.8, 0.0]\n  - [0.0, 0.0, 1.0]\n";
+  const auto split = read_imu_noise(folder.file("turned.yaml", turned));
+  ASSERT_TRUE(split.ok()) << error_line(split);
+  Eigen::Matrix3d C;
+  C << 0.8, 0.6, 0, -0.6, 0.8, 0, 0, 0, 1;
+  EXPECT_LT((split->axes.gyro - noise.axes.gyro * C).norm(), 1e-15);
+  EXPECT_LT((split->axes.gyro_by_force - noise.axes.gyro_by_force * C).norm(), 1e-15);
+
+  const auto line = [&](const char* from, const char* to) {
+    return error_line(read_imu_noise(folder.file("i.yaml", replaced(written, from, to))));
+  };
+  EXPECT_TRUE(says(line("[0.98,", "[-0.98,"), {"i.yaml:", "M: is no matrix near the identity"}));
+  EXPECT_TRUE(says(line("[0.98, 0,", "[0.98,"), {"i.yaml:", "M: 8 numbers instead of 9"}));
+  EXPECT_TRUE(says(line("[0.001, 0.001", "[0.001, -0.001"), {"i.yaml:", "no standard deviation"}));
+  EXPECT_TRUE(says(line("C_gyro_i:\n  - [1", "C_gyro_i:\n  - [2"), {"i.yaml:", "is no rotation"}));
 }
 
 TEST(Kalibr, PublishedCalibrationsAreRead) {

@@ -146,11 +146,7 @@ Expected<FoundRecording> tum_vie(const Look& look, const std::string& events) {
 // VECtor.
 
 /// The noise of VECtor's IMU as its authors publish it, for want of their file.
-constexpr ImuNoise kVectorNoise = {.accel_density = 1.26557e-3,
-                                   .accel_walk = 5.6387e-5,
-                                   .gyro_density = 7.2947e-4,
-                                   .gyro_walk = 6.9961e-6,
-                                   .rate_hz = 200};
+ImuNoise vector_noise() { return {1.26557e-3, 5.6387e-5, 7.2947e-4, 6.9961e-6, 200, {}}; }
 
 /// The rig was calibrated twice: for these sequences, with motion capture, and for those in large rooms.
 const char* vector_scale(const std::string& sequence) {
@@ -229,7 +225,7 @@ Expected<FoundRecording> vector(const Look& look, const std::string& events) {
     const auto noise = read_calibration(look.path(*model));
     if (noise) out.imu_noise = noise->imu_noise;
   }
-  if (!out.imu_noise) out.imu_noise = kVectorNoise;
+  if (!out.imu_noise) out.imu_noise = vector_noise();
   return out;
 }
 

@@ -177,9 +177,13 @@ Status RecordingMaker::write_motion_and_calibration(const Trajectory& trajectory
   if (Status done = write_tum(folder_.path("groundtruth.tum"), body); !done) return done;
   if (Status done = write_tum(folder_.path("groundtruth_camera.tum"), cam); !done) return done;
   if (Status done = write_calibration(camera); !done) return done;
-  if (Status done = write_kalibr_imu(folder_.path("imu.yaml"), imu_noise(scenario_.imu)); !done) return done;
-  return write_imu_csv(folder_.path("imu.csv"), simulate_imu(trajectory, end, scenario_.imu,
-                                                             static_cast<std::uint64_t>(scenario_.seed)));
+  const auto seed = static_cast<std::uint64_t>(scenario_.seed);
+  ImuNoise imu = imu_noise(scenario_.imu);
+  if (Status done = write_kalibr_imu(folder_.path("imu.yaml"), imu); !done) return done;
+  const ImuErrors errors = draw_imu_errors(scenario_.imu, seed);
+  imu.axes.gyro = errors.gyro_matrix, imu.axes.accel = errors.accel_matrix;
+  if (Status done = write_kalibr_imu(folder_.path("imu_truth.yaml"), imu); !done) return done;
+  return write_imu_csv(folder_.path("imu.csv"), simulate_imu(trajectory, end, scenario_.imu, seed));
 }
 
 Status RecordingMaker::write_calibration(CalibratedCamera truth) const {

@@ -88,7 +88,7 @@ std::string worst_section(const std::vector<SeedResult>& results, Given given) {
     else
       std::snprintf(head, sizeof head, "\n### Seed %d: %.150s\n\n", r->seed, run.fault.c_str());
     out += head + described(*r);
-    if (run.fault.empty())
+    if (run.fault.empty() && !r->of_other_program)
       out += text("\n![Errors over time](", course_name(r->seed, given), ") ![Events and contours](",
                   moment_name(r->seed, given), ")\n");
   }
@@ -152,6 +152,8 @@ std::string page(const std::vector<SeedResult>& results, const PageWords& words)
   std::string out = text("Made by `", words.command, "`.\n\n# Unseen flights\n\n");
   if (results.size() < static_cast<std::size_t>(words.seeds))
     out += text(results.size(), " of ", words.seeds, " seeds: the time was up.\n\n");
+  if (const auto others = std::ranges::count(results, true, &SeedResult::of_other_program); others > 0)
+    out += text(others, " of the seeds were flown by another program, whose results were given.\n\n");
   out += text(
       "Each seed draws a place, light, flight, camera, noise, the faults of the map's cloud and of the "
       "handed-over calibration. Started from the truth, judged from 0.3 s on, no alignment; poses that the "

@@ -35,6 +35,7 @@ struct SeedResult {
   std::vector<std::string> refused;
   double duration_s = 0, mev_s = 0;
   std::array<RunFigures, kGivens> runs;
+  bool of_other_program = false;  ///< taken from another run; not written
 
   const RunFigures& run(Given given) const { return runs[static_cast<std::size_t>(given)]; }
 };

@@ -45,8 +45,12 @@ Expected<std::string> run_key(const RunConfig& config) {
 /// The work on the seeds of one request; seeds may be worked on at the same time.
 class Run {
  public:
-  Run(const UnseenRequest& request, const RunConfig& config, std::string key)
-      : request_(request), config_(config), key_(std::move(key)), start_s_(wall_s()) {}
+  Run(const UnseenRequest& request, const RunConfig& config, std::string key, std::vector<SeedResult> known)
+      : request_(request),
+        config_(config),
+        key_(std::move(key)),
+        known_(std::move(known)),
+        start_s_(wall_s()) {}
 
   Status make_folders() const;
   /// Does what is left of a seed.
@@ -56,6 +60,7 @@ class Run {
  private:
   std::string seed_path(int seed) const;
   std::optional<SeedResult> find_result(int seed) const;
+  std::optional<SeedResult> find_known(int seed) const;
   std::string key_of(const unseen::Draw& draw) const { return key_ + " " + draw.key(); }
   Expected<SeedResult> make_result(int seed) const;
   Status track(const unseen::Flight& flight, Given given, SeedResult& result) const;
@@ -65,6 +70,7 @@ class Run {
   const UnseenRequest& request_;
   const RunConfig& config_;
   std::string key_;
+  std::vector<SeedResult> known_;  ///< of another run
   double start_s_;
   std::mutex mutex_;
   std::map<int, SeedResult> results_;
@@ -95,6 +101,17 @@ std::optional<SeedResult> Run::find_result(int seed) const {
   const auto draw = unseen::draw_flight(seed, static_cast<int>(result->refused.size()), request_.quick);
   if (result->key != key_of(draw)) return std::nullopt;
   return *result;
+}
+
+/// What another program with the same draw has found.
+std::optional<SeedResult> Run::find_known(int seed) const {
+  const auto known = std::ranges::find(known_, seed, &SeedResult::seed);
+  if (known == known_.end()) return std::nullopt;
+  const auto draw = unseen::draw_flight(seed, static_cast<int>(known->refused.size()), request_.quick);
+  if (!known->key.ends_with(" " + draw.key())) return std::nullopt;
+  SeedResult out = *known;
+  out.of_other_program = true;
+  return out;
 }
 
 Status Run::track(const unseen::Flight& flight, Given given, SeedResult& result) const {
@@ -156,6 +173,7 @@ void Run::work_on(int seed) {
   }
   if (!request_.rebuild_maps) {
     if (auto found = find_result(seed)) return keep(*std::move(found));
+    if (auto found = find_known(seed)) return keep(*std::move(found));
   }
   if (!time_is_up()) keep(make_result(seed));
 }
@@ -168,8 +186,9 @@ std::string command_of(const UnseenRequest& r) {
   return out;
 }
 
-/// The lines of a results.jsonl.
+/// The lines of a results.jsonl; none if no file is named.
 Expected<std::vector<SeedResult>> read_results(const std::string& path) {
+  if (path.empty()) return std::vector<SeedResult>();
   const auto content = read_text_file(path);
   if (!content) return content.error();
   std::vector<SeedResult> before;
@@ -208,19 +227,17 @@ Status run_unseen(const UnseenRequest& request) {
   if (!config) return config.error();
   auto key = run_key(*config);
   if (!key) return key.error();
-  std::vector<SeedResult> before;
-  if (!request.compare.empty()) {
-    auto read = read_results(request.compare);
-    if (!read) return read.error();
-    before = *std::move(read);
-  }
-  Run run(request, *config, *std::move(key));
+  auto before = read_results(request.compare);
+  if (!before) return before.error();
+  auto known = read_results(request.known);
+  if (!known) return known.error();
+  Run run(request, *config, *std::move(key), *std::move(known));
   if (Status done = run.make_folders(); !done) return done;
   ThreadPool pool(std::min(request.threads, request.seeds));
   pool.for_chunks(static_cast<std::size_t>(request.seeds), 1, [&](std::size_t, std::size_t i, std::size_t) {
     run.work_on(request.from + static_cast<int>(i));
   });
-  return run.finish(before);
+  return run.finish(*before);
 }
 
 }  // namespace evpose::experiments

@@ -14,7 +14,8 @@ struct UnseenRequest {
   double minutes = 0;  ///< after them no seed is begun; 0: all seeds
   std::string output = "unseen";
   std::string flights;  ///< folder in which flights are kept and found again; empty: they are deleted
-  std::string compare;  ///< results.jsonl of another run; empty: none
+  std::string known;    ///< results.jsonl of another run, whose seeds are not flown again; empty: none
+  std::string compare;  ///< likewise, to compare with; empty: none
   bool quick = false, rebuild_maps = false;
   int threads = 1;                       ///< seeds at a time
   std::vector<std::string> assignments;  ///< settings of the tracker, "key=value"

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "evpose/core/parallel.h"
+#include "evpose/map_build/corner_fill.h"
 #include "evpose/map_build/edge_profile_fit.h"
 #include "evpose/map_build/median.h"
 #include "evpose/map_build/neighbours.h"
@@ -129,6 +130,7 @@ class CreaseFinder {
   std::vector<Stretch> stretches_of(const Meeting& m, const std::vector<std::int32_t>& thirds) const;
   LineSegment fit_segment(const Meeting& m, const Stretch& stretch) const;
   bool contradicted_by_profile(const LineSegment& segment) const;
+  CornerFill fill_of(const Meeting& m, const LineSegment& segment) const;
   double snapped_to_third_plane(const Line& line, double t, double reach_m, const PlanePair& pair,
                                 const std::vector<std::int32_t>& thirds) const;
 
@@ -188,6 +190,23 @@ bool CreaseFinder::contradicted_by_profile(const LineSegment& segment) const {
     if (std::abs(profile.place) > kMostNoise * noise + kMostSigmas * profile.sigma_place) return true;
   }
   return false;
+}
+
+/// What stands in the corner, if the two are at right angles.
+CornerFill CreaseFinder::fill_of(const Meeting& m, const LineSegment& segment) const {
+  constexpr double kRightAngle = 0.94, kWindow_m = 0.24;
+  if (m.sine < kRightAngle) return {};
+  const Eigen::Vector3d middle = 0.5 * (segment.begin + segment.end);
+  const double window = std::min({kWindow_m, m.width_a_m, m.width_b_m});
+  const auto over = [](const FittedPlane& plane, const Eigen::Vector3d& out_of_other) -> Eigen::Vector3d {
+    return plane.normal.dot(out_of_other) < 0 ? plane.normal : -plane.normal;
+  };
+  const Eigen::Vector3d over_a = over(m.a, segment.normal_b), over_b = over(m.b, segment.normal_a);
+  std::vector<Eigen::Vector2d> heights;
+  for (const Eigen::Vector3d& x :
+       points_around(surface_, tree_, segment.begin, segment.end, std::sqrt(2.0) * window))
+    heights.emplace_back(over_a.dot(x - middle), over_b.dot(x - middle));
+  return corner_fill(heights, surface_.noise_near(tree_, middle), window);
 }
 
 std::optional<Meeting> CreaseFinder::meeting_of(const PlanePair& pair, const Contact& contact) const {
@@ -296,11 +315,12 @@ std::vector<LineSegment> CreaseFinder::segments_of(const PlanePair& pair, const 
   };
   std::vector<LineSegment> out;
   for (const Stretch& stretch : stretches_of(*meeting, thirds)) {
-    const LineSegment segment = fit_segment(*meeting, stretch);
+    LineSegment segment = fit_segment(*meeting, stretch);
     if (segment.sigma_m > config_.most_sigma_m ||
         stands_before(tree_, segment, reach_on(meeting->a), reach_on(meeting->b)) ||
         contradicted_by_profile(segment))
       continue;
+    segment.doubtful = fill_of(*meeting, segment).probability > 0.5;
     out.push_back(segment);
   }
   return out;

@@ -23,7 +23,8 @@ struct CreaseConfig {
 /// Where two planes meet: segments of the line in which they intersect, as far as both have points up to it.
 /// Near the line each plane is fitted again to the points beside it: walls carry skirtings, floors sag, scans
 /// are registered to a centimetre. Ends near a third plane that touches one of the two go to the point where
-/// the three meet. Planes that are `unfit` make none.
+/// the three meet. Planes that are `unfit` make none. Doubtful are those in whose corner something
+/// stands, more likely than not.
 std::vector<LineSegment> find_creases(const SurfacePoints& surface, const Neighbours& tree,
                                       const Planes& planes, const std::vector<bool>& unfit,
                                       const CreaseConfig& config, ThreadPool& pool);

@@ -16,6 +16,7 @@ struct LineSegment {
   Eigen::Vector3d normal_a = Eigen::Vector3d::Zero();  ///< in plane a, across, out of its surface; unit
   Eigen::Vector3d normal_b = Eigen::Vector3d::Zero();  ///< the same of plane b; zero if there is none
   double sigma_m = 0;                                  ///< across the contour, 1 sigma
+  bool doubtful = false;  ///< there are edges near by, and none here: no contour of the map
   std::int32_t chain =
       -1;  ///< segments of one curve, in their order, have the same; -1: a segment of its own
 

@@ -40,7 +40,7 @@ struct BuildFigures {
   CloudScale scale;
   std::size_t cylinders = 0, poles = 0;           ///< whose axes are in the map
   std::array<double, kContourKinds> by_kind_m{};  ///< lengths in the map
-  double left_out_m = 0;                          ///< of outlines: short or unsure
+  double left_out_m = 0;                          ///< of outlines and creases: short or unsure
   double normals_s = 0, planes_s = 0;             ///< elapsed in these steps
 };
 

@@ -15,7 +15,7 @@ function(evpose_install export)
 endfunction()
 
 install(TARGETS evpose_eigen EXPORT evposeTrackerTargets)
-evpose_install(evposeTrackerTargets core camera imu event map registration fusion tracker)
+evpose_install(evposeTrackerTargets core camera imu event map registration relocalization fusion tracker)
 if(TARGET evpose_eval)
   foreach(room files hdf5 events bags calibration motion maps formats recording)
     install(TARGETS evpose_io_${room} EXPORT evposeIoTargets)

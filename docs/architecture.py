@@ -13,7 +13,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]evpose/([a-z_]+)/(?:([a-z0-9_]+)/)?', re.MULTILINE)
-WIDTH, HEIGHT, ROW, TOP = 1200, 826, 80, 24
+WIDTH, HEIGHT, ROW, TOP = 1200, 906, 80, 24
 
 # Module: row (0 is the lowest), left, width, what it does. Blue boxes are the embeddable part, yellow ones the roof.
 PLACES = {
@@ -24,31 +24,33 @@ PLACES = {
     "map": (2, 640, 540, "contours, spatial index, occlusion, visible set"),
     "registration": (3, 640, 265, "events and contours to pose information"),
     "fusion": (3, 915, 265, "prediction, filter, graph, calibration"),
-    "tracker": (4, 640, 540, "predict, choose, measure, gate, fuse, judge"),
+    "relocalization": (4, 640, 540, "a pose anywhere in the map"),
+    "tracker": (5, 640, 540, "predict, choose, measure, gate, fuse, judge"),
     "io": (3, 20, 580, "every reader and writer of files"),
     "map_build": (4, 20, 140, "clouds to contours"),
     "sim": (4, 175, 285, "recordings of made-up flights"),
     "eval": (4, 475, 125, "errors, lag, NEES"),
-    "report": (5, 290, 310, "run folder, report.html, pictures"),
-    "serve": (5, 640, 265, "live sources, queue, session"),
-    "mavlink": (5, 915, 265, "frames, messages, link"),
-    "run": (6, 290, 310, "a recording through the tracker"),
-    "view": (6, 640, 265, "browser: server and pages"),
-    "batch": (7, 290, 310, "all data at once: smoother"),
-    "calibrate": (8, 610, 295, "cameras from flights before a map"),
-    "map_learn": (8, 290, 310, "maps made better by flights"),
-    "bench": (7, 20, 240, "what the figures are made with"),
-    "apps": (9, 290, 490, "the program: one file per command"),
-    "ros": (9, 800, 180, "ROS 1 node"),
-    "python": (9, 1000, 180, "Python module"),
+    "report": (6, 290, 310, "run folder, report.html, pictures"),
+    "serve": (6, 640, 265, "live sources, queue, session"),
+    "mavlink": (6, 915, 265, "frames, messages, link"),
+    "run": (7, 290, 310, "a recording through the tracker"),
+    "view": (7, 640, 265, "browser: server and pages"),
+    "batch": (8, 290, 310, "all data at once: smoother"),
+    "calibrate": (9, 610, 295, "cameras from flights before a map"),
+    "map_learn": (9, 290, 310, "maps made better by flights"),
+    "bench": (8, 20, 240, "what the figures are made with"),
+    "apps": (10, 290, 490, "the program: one file per command"),
+    "ros": (10, 800, 180, "ROS 1 node"),
+    "python": (10, 1000, 180, "Python module"),
 }
-EMBEDDABLE = {"core", "event", "camera", "imu", "map", "registration", "fusion", "tracker"}
+EMBEDDABLE = {"core", "event", "camera", "imu", "map", "registration", "relocalization", "fusion",
+              "tracker"}
 ROOF = {"apps", "ros", "python", "bench"}
 
 # The flow of the data: corners as (module, x share, side) or plain points, and a label with its place.
 FLOW = [
-    ([(300, 604), ("io", 0.483, "bottom")], "recordings, clouds, maps", (312, 598)),
-    ([("io", 1.0, "right"), (622, 533), (622, 453), ("tracker", 0.0, "left")], "", None),
+    ([(300, 684), ("io", 0.483, "bottom")], "recordings, clouds, maps", (312, 678)),
+    ([("io", 1.0, "right"), (622, 613), (622, 453), ("tracker", 0.0, "left")], "", None),
     ([("serve", 0.15, "bottom"), ("tracker", 0.0736, "top")], "packets", (687, 418)),
     ([("tracker", 0.206, "top"), ("serve", 0.42, "bottom")], "poses", (758, 418)),
     ([("tracker", 0.77, "top"), ("mavlink", 0.531, "bottom")], "poses", (1063, 418)),

@@ -15,13 +15,13 @@ CORE = {"core"}
 SENSORS = CORE | {"camera", "imu", "event"}
 MAP = SENSORS | {"map"}
 SOLVERS = MAP | {"registration", "fusion"}
-TRACKER = SOLVERS | {"tracker"}
+TRACKER = SOLVERS | {"relocalization", "tracker"}
 IO = MAP | {"io"}
 ALL = TRACKER | IO | {"map_build", "sim", "eval", "report", "run", "batch", "calibrate", "map_learn", "mavlink", "serve",
                       "view", "bench"}
 MAY_SEE = {
     "core": set(), "camera": CORE, "imu": CORE, "event": CORE, "map": SENSORS,
-    "registration": MAP, "fusion": MAP, "tracker": SOLVERS,
+    "registration": MAP, "relocalization": MAP | {"registration"}, "fusion": MAP, "tracker": SOLVERS | {"relocalization"},
     "io": MAP, "map_build": IO, "sim": IO, "eval": IO,
     "mavlink": TRACKER, "serve": TRACKER | IO | {"mavlink"}, "view": TRACKER | IO | {"report"},
     "run": TRACKER | IO | {"report"}, "batch": TRACKER | IO | {"report", "run"},

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/relocalization/place_index.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace evpose {
+namespace {
+
+constexpr double kLeastEdge_m = 0.7;
+constexpr std::uint32_t kNone = ~0U;
+constexpr double kMostPlaces = 1500;
+constexpr double kCell = 0.03;              // of the depth buffers, tangent units
+constexpr double kTangent = 1.05;           // of a side's half angle of view: a little more than 45 deg
+constexpr double kSpacing_rad = 0.035;      // of points along contours, as they are seen
+constexpr std::size_t kFewestPoints = 150;  // in all directions: fewer are inside of something
+constexpr double kRoom_m = 0.2;
+constexpr double kNearest_m = 0.3;  // points nearer to a place's middle are left out
+
+/// The camera's z axis along each axis of the map.
+Eigen::Matrix3d side(int number) {
+  const int axis = number / 2;
+  const double sign = number % 2 == 0 ? 1 : -1;
+  Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
+  R(axis, 2) = sign;
+  R((axis + 1) % 3, 0) = 1;
+  R((axis + 2) % 3, 1) = sign;
+  return R;
+}
+
+int side_of(const Eigen::Vector3d& ray) {
+  int axis = 0;
+  ray.cwiseAbs().maxCoeff(&axis);
+  return 2 * axis + (ray[axis] < 0 ? 1 : 0);
+}
+
+/// Of the squares that the sides of a cube are divided into.
+int direction_of(const Eigen::Vector3d& ray) {
+  constexpr int kSquares = PlaceIndex::kSquares;
+  const int s = side_of(ray), axis = s / 2;
+  const double depth = std::abs(ray[axis]);
+  const auto square = [&](int k) {
+    const double tangent = ray[(axis + k) % 3] / depth;
+    return std::clamp(static_cast<int>(0.5 * (tangent + 1) * kSquares), 0, kSquares - 1);
+  };
+  return (s * kSquares + square(1)) * kSquares + square(2);
+}
+
+/// Evenly in 0 .. 1, the same for a point at every place.
+double chance(std::uint32_t point) {
+  std::uint32_t h = point * 0x9E3779B1u;
+  h ^= h >> 15;
+  h *= 0x85EBCA77u;
+  return static_cast<double>(h ^ (h >> 13)) / 4294967296.0;
+}
+
+template <std::size_t... I>
+std::array<DepthBuffer, 6> make_depth(std::index_sequence<I...> /*unused*/) {
+  return {((void)I, DepthBuffer(Eigen::Vector2d(kTangent, kTangent), kCell))...};
+}
+
+}  // namespace
+
+Eigen::AlignedBox3d space_around(const ContourMap& map) {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < map.points.size(); ++i)
+    if (!is_view_dependent(map.points[i].kind)) box.extend(map.position(i));
+  box.min().array() -= kRoom_m;
+  box.max().array() += kRoom_m;
+  return box;
+}
+
+PlaceIndex::PlaceIndex(const ContourIndex& index, const VisibleSetConfig& config,
+                       const Eigen::AlignedBox3d& box)
+    : index_(index),
+      config_(config),
+      edge_m_(std::max(kLeastEdge_m, std::cbrt(box.volume() / kMostPlaces))),
+      depth_(make_depth(std::make_index_sequence<6>())),
+      occlusion_(config.occlusion && !index.occluders().empty()) {
+  if (box.isEmpty()) return;
+  sample_of_.assign(index.map().points.size(), kNone);
+  const Eigen::Vector3i counts = (box.sizes() / edge_m_).array().ceil().max(1).cast<int>();
+  const Eigen::Vector3d first = box.center() - 0.5 * edge_m_ * (counts.array() - 1).matrix().cast<double>();
+  for (int x = 0; x < counts.x(); ++x)
+    for (int y = 0; y < counts.y(); ++y)
+      for (int z = 0; z < counts.z(); ++z) add_place(first + edge_m_ * Eigen::Vector3d(x, y, z));
+}
+
+void PlaceIndex::draw_surfaces(const Eigen::Vector3d& middle) {
+  const ContourMap& map = index_.map();
+  for (int s = 0; s < 6; ++s) {
+    const Eigen::Matrix3d R = side(s);
+    DepthBuffer& depth = depth_[static_cast<std::size_t>(s)];
+    depth.reset_view(map, {Eigen::Quaterniond(R), middle}, config_.near_m);
+    for (const ContourIndex::Occluders& block : index_.occluders()) {
+      const Eigen::Vector3d centre = R.transpose() * (map.anchor + block.centre.cast<double>() - middle);
+      const double reach = std::max(std::abs(centre.x()), std::abs(centre.y())) - kTangent * centre.z();
+      if (reach > 1.5 * block.radius || centre.z() < -block.radius) continue;
+      depth.draw(map, std::span(index_.occluder_order()).subspan(block.begin, block.end - block.begin));
+    }
+  }
+}
+
+bool PlaceIndex::hidden(const Eigen::Vector3d& from_middle) const {
+  const int s = side_of(from_middle);
+  return depth_[static_cast<std::size_t>(s)].hides(side(s).transpose() * from_middle);
+}
+
+void PlaceIndex::add_place(const Eigen::Vector3d& middle) {
+  const ContourMap& map = index_.map();
+  if (occlusion_) draw_surfaces(middle);
+  for (auto& seen : of_direction_) seen.clear();
+  std::size_t count = 0;
+  cubes_.clear();
+  index_.append_cubes_within(middle, config_.far_m, cubes_);
+  for (const std::uint32_t c : cubes_) {
+    const ContourIndex::Cube& cube = index_.cubes()[c];
+    const double nearest =
+        (map.anchor + cube.centre.cast<double>() - middle).norm() - static_cast<double>(cube.radius);
+    const auto wanted = static_cast<float>(kSpacing_rad * std::max(nearest, kNearest_m));
+    const std::uint32_t end = cube.end_for(wanted);
+    // Points at that level lie this far apart.
+    double spacing = static_cast<double>(ContourIndex::kCoarsest_m);
+    while (spacing > wanted && spacing > 0.011) spacing /= 2;
+    const double most_wanted = spacing / (kSpacing_rad * std::max(nearest, kNearest_m));
+    for (std::uint32_t k = cube.begin; k < end; ++k) {
+      const std::uint32_t number = index_.order()[k];
+      if (chance(number) > most_wanted) continue;
+      const Eigen::Vector3d ray = map.position(number) - middle;
+      const double distance = ray.norm();
+      if (distance < kNearest_m || distance > config_.far_m) continue;
+      const double sine = map.points[number].tangent.cast<double>().cross(ray).norm() / distance;
+      if (sine < config_.grazing_sin || chance(number) > spacing * sine / (kSpacing_rad * distance)) continue;
+      if (occlusion_ && hidden(ray)) continue;
+      std::uint32_t& sample = sample_of_[number];
+      if (sample == kNone) {
+        sample = static_cast<std::uint32_t>(samples_.size());
+        samples_.push_back({map.points[number].position, map.points[number].tangent});
+      }
+      of_direction_[static_cast<std::size_t>(direction_of(ray))].push_back(sample);
+      ++count;
+    }
+  }
+  if (count < kFewestPoints) return;
+  Place place{middle, {}};
+  for (std::size_t k = 0; k < kDirections; ++k) {
+    place.begins[k] = static_cast<std::uint32_t>(points_.size());
+    points_.insert(points_.end(), of_direction_[k].begin(), of_direction_[k].end());
+  }
+  place.begins[kDirections] = static_cast<std::uint32_t>(points_.size());
+  places_.push_back(place);
+}
+
+std::vector<int> PlaceIndex::directions_around(const Eigen::Vector3d& axis, double angle_rad) {
+  std::vector<int> out;
+  for (int s = 0; s < 6; ++s)
+    for (int i = 0; i < kSquares; ++i)
+      for (int j = 0; j < kSquares; ++j) {
+        const int along = s / 2;
+        const auto corner = [&](double a, double b) {
+          Eigen::Vector3d ray;
+          ray[along] = s % 2 == 0 ? 1 : -1;
+          ray[(along + 1) % 3] = 2 * (i + a) / kSquares - 1;
+          ray[(along + 2) % 3] = 2 * (j + b) / kSquares - 1;
+          return Eigen::Vector3d(ray.normalized());
+        };
+        const Eigen::Vector3d middle = corner(0.5, 0.5);
+        double radius = 0;
+        for (const double a : {0.0, 1.0})
+          for (const double b : {0.0, 1.0}) radius = std::max(radius, std::acos(middle.dot(corner(a, b))));
+        if (std::acos(std::clamp(middle.dot(axis), -1.0, 1.0)) < angle_rad + radius)
+          out.push_back((s * kSquares + i) * kSquares + j);
+      }
+  return out;
+}
+
+}  // namespace evpose

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evpose/relocalization/wide_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evpose/relocalization/place_search.h"
+
+namespace evpose {
+namespace {
+
+constexpr std::size_t kAttitudes = 16;
+constexpr std::size_t kPlaces = 400;  // of all attitudes together
+constexpr std::size_t kRefined = 48;  // of the different ones among these
+constexpr std::size_t kKept = 16;
+constexpr double kSigmas = 2.5;                              // of the prior that are searched
+constexpr double kDifferent_m = 0.15, kDifferent_rad = 0.1;  // before refinement
+constexpr double kSame_m = 0.03, kSame_rad = 0.015;          // after it
+constexpr double kAttitudeSigma_rad = 0.02;                  // of an attitude by lines
+constexpr double kPlaceSigma = 0.15;                         // of a position among places, in edges of these
+constexpr double kLastReach_px = 3;
+constexpr double kAbove_px = 100;                     // 1 sigma
+constexpr double kBeside_m = 0.5, kBesideSigmas = 1;  // of the first prior, places are known, too
+constexpr double kTypicalDepth_m = 3;                 // turns metres into pixels
+constexpr double kReach = 0.03;                       // of the first refinement, tangent units
+
+VisibleSetConfig points_to_refine(VisibleSetConfig config) {
+  config.stride_px = 8;
+  config.margin_px = 40;
+  config.budget = 700;
+  config.refresh_px = 0;  // chosen anew for each pose
+  return config;
+}
+
+void keep_different(std::vector<PoseGuess>& guesses, double apart_m, double apart_rad, std::size_t most) {
+  std::stable_sort(guesses.begin(), guesses.end(),
+                   [](const PoseGuess& a, const PoseGuess& b) { return a.score > b.score; });
+  std::vector<PoseGuess> out;
+  for (const PoseGuess& g : guesses) {
+    if (out.size() == most) break;
+    if (std::none_of(out.begin(), out.end(), [&](const PoseGuess& o) {
+          return (g.T_map_body.p - o.T_map_body.p).norm() < apart_m &&
+                 g.T_map_body.q.angularDistance(o.T_map_body.q) < apart_rad;
+        }))
+      out.push_back(g);
+  }
+  guesses = std::move(out);
+}
+
+}  // namespace
+
+bool WideSearch::suits(const Matrix6d& covariance, const Camera& camera) {
+  const Eigen::Vector3d p = covariance.diagonal().head<3>(), r = covariance.diagonal().tail<3>();
+  return camera.focal_px() * (std::sqrt(p.maxCoeff()) / kTypicalDepth_m + std::sqrt(r.maxCoeff())) >
+         kAbove_px;
+}
+
+WideSearch::WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible)
+    : index_(index),
+      camera_(camera),
+      visible_config_(visible),
+      space_(space_around(index.map())),
+      directions_(main_directions(index.map())),
+      line_finder_(camera.size()),
+      visible_(index, camera, points_to_refine(visible)) {}
+
+/// Where the camera may be.
+Eigen::AlignedBox3d WideSearch::box(const WidePrior& prior) const {
+  const Eigen::Vector3d reach = kSigmas * prior.covariance.diagonal().head<3>().cwiseSqrt();
+  return space_.intersection(Eigen::AlignedBox3d(prior.T_map_body.p - reach, prior.T_map_body.p + reach));
+}
+
+void WideSearch::prepare(const WidePrior& prior) {
+  const Eigen::AlignedBox3d wanted = box(prior);
+  if (wanted.isEmpty() || (places_ && places_box_.contains(wanted))) return;
+  // The prior widens with time.
+  const Eigen::Vector3d beside =
+      kBesideSigmas * prior.covariance.diagonal().head<3>().cwiseSqrt().array() + kBeside_m;
+  places_box_ = space_.intersection(Eigen::AlignedBox3d(wanted.min() - beside, wanted.max() + beside));
+  places_ = std::make_unique<PlaceIndex>(index_, visible_config_, places_box_);
+}
+
+PoseGuess WideSearch::refine(const EdgeField& field, const Pose& T_body_cam, const PoseGuess& guess,
+                             double from_px, double sigma_m, double sigma_rad) {
+  const ContourMap& map = index_.map();
+  points_.clear();
+  for (const std::uint32_t i : visible_.choose(guess.T_map_body * T_body_cam))
+    points_.push_back({map.position(i), map.points[i].tangent.cast<double>()});
+  if (points_.empty()) return {guess.T_map_body, -1e3};
+  Vector6d information;
+  information << Eigen::Vector3d::Constant(1 / (sigma_m * sigma_m)),
+      Eigen::Vector3d::Constant(1 / (sigma_rad * sigma_rad));
+  PoseGuess out =
+      refine_pose({field, camera_, T_body_cam, points_}, guess.T_map_body, information.asDiagonal(), from_px);
+  out.score *= std::sqrt(static_cast<double>(points_.size()));
+  return out;
+}
+
+std::vector<PoseGuess> WideSearch::find(std::span<const FilteredEvent> events, const EdgeField& field,
+                                        const Pose& T_body_cam, const WidePrior& prior) {
+  prepare(prior);
+  if (!places_ || places_->places().empty()) return {};
+  const std::vector<EdgeLine> lines = line_finder_.find(events);
+  AttitudePrior attitude{prior.up_body.normalized(), prior.T_map_body.q};
+  attitude.turned_within = kSigmas * std::sqrt(prior.covariance.diagonal().tail<3>().sum());
+  // Of the heading about the map's z.
+  const Eigen::Matrix3d R = prior.T_map_body.rotation();
+  const Eigen::Matrix3d about_map = R * prior.covariance.bottomRightCorner<3, 3>() * R.transpose();
+  attitude.heading_within = kSigmas * std::sqrt(about_map(2, 2));
+  const std::vector<AttitudeGuess> attitudes =
+      search_attitude(lines, camera_, T_body_cam.q, directions_, attitude, kAttitudes);
+  std::vector<PoseGuess> guesses =
+      search_places(lines, camera_, T_body_cam, *places_, box(prior), attitudes, kPlaces);
+  keep_different(guesses, kDifferent_m, kDifferent_rad, kRefined);
+  for (PoseGuess& g : guesses)
+    g = refine(field, T_body_cam, g, std::max(refine_reach_px(), kReach * camera_.focal_px()),
+               kPlaceSigma * places_->edge_m(), kAttitudeSigma_rad);
+  keep_different(guesses, kSame_m, kSame_rad, kKept);
+  for (PoseGuess& g : guesses)  // what is seen from there now
+    g = refine(field, T_body_cam, g, kLastReach_px, kPlaceSigma * places_->edge_m(), kAttitudeSigma_rad);
+  keep_different(guesses, kSame_m, kSame_rad, kKept);
+  return guesses;
+}
+
+}  // namespace evpose

@@ -18,14 +18,14 @@ void add_input_options(CLI::App& command, TrackRequest& request, const std::stri
   command.add_option("--occluders", request.occluders,
                      "PLY mesh that hides contours behind it; default: the map's own");
   command.add_option("--init", request.init,
-                     "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file; default: ground truth if "
-                     "there is one, else the recording's initial_pose");
+                     "start: groundtruth, anywhere, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file; default: ground "
+                     "truth if there is one, else the recording's initial_pose");
   command
       .add_option("--init-sigma", request.init_sigma,
                   "how far off the given pose may be, m and deg per axis: it is searched there")
       ->delimiter(',')
       ->expected(2)
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(CLI::Range(0.0, 180.0));
   command.add_option("--preset", request.preset,
                      "settings to begin with: paper, the method of EV-Pose in place of the defaults");
   command.add_option("--config", request.config_file, "YAML file with settings");

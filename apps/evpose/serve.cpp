@@ -50,13 +50,14 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   command->add_option("--imu-model", track.imu_model,
                       "the IMU's noise and axes as Kalibr writes them; default: the recording's imu.yaml");
   command->add_option("--occluders", track.occluders, "PLY mesh that hides contours behind it");
-  command->add_option("--init", track.init, "start: groundtruth, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
+  command->add_option("--init", track.init,
+                      "start: groundtruth, anywhere, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
   command
       ->add_option("--init-sigma", track.init_sigma,
                    "how far off the given pose may be, m and deg per axis: it is searched there")
       ->delimiter(',')
       ->expected(2)
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(CLI::Range(0.0, 180.0));
   command->add_option("--mavlink", request->mavlink,
                       "to an autopilot: udp://HOST:PORT, udpin://HOST:PORT or serial:///dev/ttyX:BAUD");
   auto port = std::make_shared<int>(8088);

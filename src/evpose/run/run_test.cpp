@@ -103,6 +103,7 @@ TEST(Start, WordsTellWhereThePoseComesFrom) {
   EXPECT_EQ(start_words("auto", false), "started from the recording's initial_pose");
   EXPECT_EQ(start_words("1,2,3,0,0,0,1", true), "started from --init");
   EXPECT_EQ(start_words("a.tum", true), "started from a.tum");
+  EXPECT_EQ(start_words("anywhere", true), "started anywhere in the map");
 }
 
 }  // namespace

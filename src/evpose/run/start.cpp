@@ -43,8 +43,9 @@ bool parse(const char*& at, const char* end, double* value) {
 }
 
 Expected<StartState> from_text(const std::string& text_in, const Recording& recording) {
-  const Error wrong{"--init", "'" + text_in + "' is no start pose",
-                    "give groundtruth, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s] with a unit quaternion"};
+  const Error wrong{
+      "--init", "'" + text_in + "' is no start pose",
+      "give groundtruth, anywhere, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s] with a unit quaternion"};
   const char* at = text_in.data();
   const char* const end = at + text_in.size();
   double v[7];
@@ -94,11 +95,20 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
     start.T_map_body = recording.initial_pose->T_map_body;
     return start;
   }
+  if (starts_anywhere(init)) {
+    if (!recording.has_imu)
+      return Error{"--init anywhere", "the recording has no IMU, which tells what is up",
+                   "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
+    widen(kAnywhereSigma_m, kAnywhereSigma_deg * M_PI / 180, config);
+    StartState start;
+    start.t = recording.first_ns;
+    return start;
+  }
   if (init.find(',') == std::string::npos) {
     const auto poses = read_tum(init);
     if (!poses)
       return Error{"--init", poses.error().line(),
-                   "give groundtruth, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
+                   "give groundtruth, anywhere, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
     return from_trajectory(*poses, recording, init);
   }
   auto start = from_text(init, recording);
@@ -113,6 +123,7 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
 std::string start_words(const std::string& init, bool has_truth) {
   if (init == "groundtruth" || (init == "auto" && has_truth)) return "started from ground truth";
   if (init == "auto") return "started from the recording's initial_pose";
+  if (starts_anywhere(init)) return "started anywhere in the map";
   return init.find(',') == std::string::npos ? "started from " + init : "started from --init";
 }
 

@@ -20,10 +20,16 @@ struct StartSigma {
 ///   groundtruth  the first ground-truth pose inside the events, with its velocity
 ///   x,y,z,qx,qy,qz,qw[@t_s]   T_map_body at a time of the recording's clock, at rest or moving slowly
 ///   FILE         a TUM trajectory of T_map_body, used like ground truth
+///   anywhere     at the recording's begin, at the origin: nothing is known (StartState is to be put into the
+///   map)
 /// A pose without velocity widens the start's uncertainty in `config`.
 Expected<StartState> choose_start(const std::string& init, const Recording& recording,
                                   const std::vector<TimedPose>& truth, const StartSigma& sigma,
                                   FusionConfig* config);
+
+/// The start's sigma where nothing is known: positions further off than the map reaches do not matter.
+inline constexpr double kAnywhereSigma_m = 1e3, kAnywhereSigma_deg = 180;
+inline bool starts_anywhere(const std::string& init) { return init == "anywhere"; }
 
 /// Where choose_start() takes the pose from, in words: "started from ground truth".
 std::string start_words(const std::string& init, bool has_truth);

@@ -149,13 +149,19 @@ namespace {
 /// By place, if the file can be read so and nothing asks for all of the map.
 Expected<OpenedMap> open_map_of(const TrackRequest& request, const RunConfig& config,
                                 const Recording& recording, const Eigen::Vector3d& start_map) {
-  if (!request.occluders.empty() || !request.learnt_map.empty()) {
+  if (!request.occluders.empty() || !request.learnt_map.empty() || starts_anywhere(request.init)) {
     const auto map = load_map(request, recording);
     if (!map) return map.error();
     return OpenedMap{*map, {}};
   }
   const auto path = map_path(request, recording);
   return path ? open_map(*path, start_map, config.tracker) : path.error();
+}
+
+Eigen::Vector3d middle_of(const ContourMap& map) {
+  Eigen::AlignedBox3f box;
+  for (const ContourPoint& p : map.points) box.extend(p.position);
+  return box.isEmpty() ? map.anchor : Eigen::Vector3d(map.anchor + box.center().cast<double>());
 }
 
 /// A recording of frames alone is tracked by them.
@@ -181,11 +187,12 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
   job.config = config;
   if (auto status = choose_frame_use(recording, job.config.tracker.frames.use); !status)
     return status.error();
-  const auto start = choose_start(request.init, recording, truth,
-                                  {request.init_sigma[0], request.init_sigma[1]}, &job.config.tracker.fusion);
+  auto start = choose_start(request.init, recording, truth, {request.init_sigma[0], request.init_sigma[1]},
+                            &job.config.tracker.fusion);
   if (!start) return start.error();
   const auto map = open_map_of(request, job.config, recording, start->T_map_body.p);
   if (!map) return map.error();
+  if (starts_anywhere(request.init)) start->T_map_body.p = middle_of(*map->map);
   job.recording = recording;
   job.map = map->map;
   job.truth = std::move(truth);
@@ -230,6 +237,8 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   }
   auto job = make_job(request, config, *recording, std::move(truth));
   if (!job) return job;
+  if (starts_anywhere(request.init) && !imu.empty())
+    job->start.T_map_body.q = Eigen::Quaterniond::FromTwoVectors(imu.front().accel, Eigen::Vector3d::UnitZ());
   for (const Error& doubt : doubt_imu(imu, job->truth, job->start, recording->imu_path))
     job->findings.push_back(doubt);
   return job;

@@ -14,6 +14,7 @@ constexpr double kEventsPerColumn = 30;
 constexpr double kThinShare = 0.25;     // of them is enough after kThinAfter_s
 constexpr double kThinAfter_s = 0.015;  // slow motion: contours move little in this time
 constexpr double kLongest_s = 0.03;     // contours at 1 m/s and 3 m move by some pixels
+constexpr double kManyTimes = 3;        // as many events show faint edges, too
 constexpr std::size_t kFewestEvents = 500;
 constexpr int kFlowCell_px = 16;  // rotational flow is taken as constant within
 
@@ -24,10 +25,18 @@ void EventSlice::restart(TimeNs t) {
   begin_ = t;
 }
 
+/// 1: as many events as a slice needs.
+double EventSlice::filled() const {
+  return static_cast<double>(events_.size()) / (kEventsPerColumn * image_width_);
+}
+
 bool EventSlice::complete(TimeNs t) const {
-  const double filled = static_cast<double>(events_.size()) / (kEventsPerColumn * image_width_);
   const double span_s = to_seconds(t - begin_);
-  return filled >= 1 || (filled >= kThinShare && span_s >= kThinAfter_s) || span_s >= kLongest_s;
+  return filled() >= 1 || (filled() >= kThinShare && span_s >= kThinAfter_s) || span_s >= kLongest_s;
+}
+
+bool EventSlice::complete_with_faint_edges(TimeNs t) const {
+  return filled() >= kManyTimes || to_seconds(t - begin_) >= kLongest_s;
 }
 
 bool EventSlice::sparse() const { return events_.size() < kFewestEvents; }

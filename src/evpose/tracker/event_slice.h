@@ -26,12 +26,16 @@ class EventSlice {
 
   /// Enough events have come, or enough time has passed.
   bool complete(TimeNs t) const;
+  /// The same for faint edges, too, and edges that move slowly.
+  bool complete_with_faint_edges(TimeNs t) const;
   /// So few events that nothing moves.
   bool sparse() const;
   double mean_age_s(std::uint32_t now_us) const;
   std::span<const FilteredEvent> events() const { return events_; }
 
  private:
+  double filled() const;
+
   int image_width_;
   std::vector<FilteredEvent> events_;
   TimeNs begin_ = 0;

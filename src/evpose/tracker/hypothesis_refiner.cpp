@@ -86,7 +86,7 @@ void HypothesisRefiner::add_intervals(Registration& registration, const ContourV
   const Matrix6d pose_covariance = Matrix6d::Zero();  // the gates are as they are
   registration.restart();
   NavState nav = h.nav;
-  double age_s = 0, matched = 0, asked = 0;
+  double age_s = 0, matched = 0, all = 0;
   for (std::size_t k = 0; k < intervals; ++k) {
     const EventInterval& interval = intervals_[k];
     const double span_s = interval.motion.dt_s;
@@ -96,7 +96,7 @@ void HypothesisRefiner::add_intervals(Registration& registration, const ContourV
         registration.measure({interval.events, interval.now_us, span_s, samples_, pose_covariance});
     h.concentration = r.gate_concentration;
     matched += r.events;
-    asked += static_cast<double>(samples_.size());
+    all += static_cast<double>(interval.events.size());
     // Derivative of the pose at this age by the newest pose and velocity.
     Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
     J.block<3, 3>(0, 0).setIdentity();
@@ -107,7 +107,8 @@ void HypothesisRefiner::add_intervals(Registration& registration, const ContourV
     age_s += span_s;
     nav = motion_.propagate_back(h, nav, interval.motion);
   }
-  h.support = h.concentration * matched / std::max(1.0, asked);
+  h.support = h.concentration * matched;
+  h.explained = h.support / std::max(1.0, all);
 }
 
 }  // namespace evpose

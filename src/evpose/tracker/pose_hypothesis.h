@@ -23,7 +23,8 @@ struct PoseHypothesis {
   double position_variance = 0, velocity_variance = 0, position_velocity_covariance = 0;
   double rotation_variance = 0;
   double concentration = 0;  ///< gate concentration of its events in the last slice
-  double support = 0;        ///< events per contour point that concentrate there, in the last slice
+  double support = 0;        ///< events that concentrate at the contours, in the last slice
+  double explained = 0;      ///< share that these are of all events
   double mean_concentration = 0, mean_support = 0;  ///< over slices, the newest counting most
 };
 

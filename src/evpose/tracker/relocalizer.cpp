@@ -36,6 +36,7 @@ constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
 constexpr double kLeastLead = 1.15;                    // over the next pose, in support
+constexpr double kLeastExplained = 0.055;              // of all events, beyond an even spread; wide searches
 constexpr double kClearLead = 2;                       // makes a low concentration enough
 constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
 
@@ -73,6 +74,10 @@ void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& 
   elapsed_s_ = 0;
   restart_search(t);
   searches_ = 0;
+  workspace_->widely = motion_.has_imu() && WideSearch::suits(covariance, scene_.camera);
+  if (!workspace_->widely) return;
+  if (!workspace_->wide) workspace_->wide.emplace(scene_.index, scene_.camera, scene_.visible);
+  workspace_->wide->prepare(wide_prior());
 }
 
 void Relocalizer::restart_search(TimeNs t) {
@@ -102,7 +107,7 @@ std::optional<Relocalizer::Found> Relocalizer::process(const RelocalizerInput& i
     return {};
   }
   slice_.add(input.events);
-  if (!slice_.complete(input.t)) return {};
+  if (!slice_is_complete(input.t)) return {};
   if (slice_.sparse()) {
     slice_.restart(input.t);
     return {};
@@ -111,6 +116,11 @@ std::optional<Relocalizer::Found> Relocalizer::process(const RelocalizerInput& i
   slice_.restart(input.t);
   last_slice_ = input.t;
   return accept_best();
+}
+
+/// A wide search wants more of the image's lines than a narrow one, whose contours have to be sharp.
+bool Relocalizer::slice_is_complete(TimeNs t) const {
+  return workspace_->widely && slices_ == 0 ? slice_.complete_with_faint_edges(t) : slice_.complete(t);
 }
 
 void Relocalizer::process_slice(const RelocalizerInput& input) {
@@ -124,7 +134,9 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
     workspace_->field.build(workspace_->compensated);
   }
   propagate_prior();
-  if (slices_ == 0)
+  if (slices_ == 0 && workspace_->widely)
+    search_widely(input.T_body_cam, age_s);
+  else if (slices_ == 0)
     search_around_prior(input.T_body_cam, age_s);
   else
     update_hypotheses(input.T_body_cam, age_s);
@@ -135,7 +147,11 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
 void Relocalizer::propagate_prior() {
   PoseHypothesis prior{prior_};
   motion_.propagate(prior, since_slice_, false);
-  prior_ = prior.nav;
+  // With a wrong attitude, gravity would accelerate it.
+  if (workspace_->widely)
+    prior_.T_map_body.q = prior.nav.T_map_body.q;
+  else
+    prior_ = prior.nav;
   elapsed_s_ += since_slice_.dt_s;
 }
 
@@ -157,28 +173,52 @@ void Relocalizer::search_around_prior(const Pose& T_body_cam, double age_s) {
   hypotheses_.clear();
   if (view.points.empty()) return;
   for (const PoseGuess& guess :
-       search_pose(view, prior_.T_map_body, covariance, static_cast<unsigned>(1 + searches_))) {
-    PoseHypothesis h{prior_};
-    // The slice shows where the body was age_s ago.
-    h.nav.T_map_body = {guess.T_map_body.q * so3::exp(age_s * angular_rate_),
-                        guess.T_map_body.p + age_s * prior_.velocity};
-    if (hypotheses_.size() < kRefined) workspace_->refiner.refine(h, T_body_cam, slices_);
-    h.mean_concentration = h.concentration;
-    h.mean_support = h.support;
-    h.position_variance = std::pow(kEdgePositionSigma_m, 2);
-    h.rotation_variance = std::pow(kEdgeRotationSigma_rad, 2);
-    h.velocity_variance = kUnknownVelocitySigma_m_s * kUnknownVelocitySigma_m_s;
-    hypotheses_.push_back(h);
-  }
+       search_pose(view, prior_.T_map_body, covariance, static_cast<unsigned>(1 + searches_)))
+    add_hypothesis(guess, prior_.velocity, T_body_cam, age_s);
+}
+
+WidePrior Relocalizer::wide_prior() const {
+  WidePrior out{prior_.T_map_body, prior_covariance_,
+                since_slice_.dt_s > 0 ? Eigen::Vector3d(since_slice_.dq.conjugate() * since_slice_.dv)
+                                      : Eigen::Vector3d::UnitZ()};
+  out.covariance.topLeftCorner<3, 3>().diagonal().array() +=
+      std::pow(kUnknownVelocitySigma_m_s * elapsed_s_, 2);
+  return out;
+}
+
+void Relocalizer::search_widely(const Pose& T_body_cam, double age_s) {
+  hypotheses_.clear();
+  for (const PoseGuess& guess :
+       workspace_->wide->find(workspace_->compensated, workspace_->field, T_body_cam, wide_prior()))
+    add_hypothesis(guess, Eigen::Vector3d::Zero(), T_body_cam, age_s);
+}
+
+void Relocalizer::add_hypothesis(const PoseGuess& guess, const Eigen::Vector3d& velocity,
+                                 const Pose& T_body_cam, double age_s) {
+  // The slice shows where the body was age_s ago.
+  PoseHypothesis h{
+      {{guess.T_map_body.q * so3::exp(age_s * angular_rate_), guess.T_map_body.p + age_s * velocity},
+       velocity}};
+  if (hypotheses_.size() < kRefined) workspace_->refiner.refine(h, T_body_cam, slices_);
+  h.mean_concentration = h.concentration;
+  h.mean_support = h.support;
+  h.position_variance = std::pow(kEdgePositionSigma_m, 2);
+  h.rotation_variance = std::pow(kEdgeRotationSigma_rad, 2);
+  h.velocity_variance = kUnknownVelocitySigma_m_s * kUnknownVelocitySigma_m_s;
+  hypotheses_.push_back(h);
 }
 
 void Relocalizer::update_hypotheses(const Pose& T_body_cam, double age_s) {
   for (PoseHypothesis& h : hypotheses_) motion_.propagate(h, since_slice_, slices_ > 1);
   if (hypotheses_.empty()) return;
-  const SearchView view = view_from(hypotheses_.front().nav.T_map_body, T_body_cam);
+  SearchView view = view_from(hypotheses_.front().nav.T_map_body, T_body_cam);
   if (view.points.empty()) return;
-  for (std::size_t i = 0; i < hypotheses_.size(); ++i)
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    // Poses of a wide search see other contours each.
+    if (workspace_->widely && i > 0)
+      view.points = view_from(hypotheses_[i].nav.T_map_body, T_body_cam).points;
     hypotheses_[i] = updated(hypotheses_[i], i < kRefined, view, age_s);
+  }
   for (PoseHypothesis& h : hypotheses_) {
     h.mean_concentration += kNewestWeight * (h.concentration - h.mean_concentration);
     h.mean_support += kNewestWeight * (h.support - h.mean_support);
@@ -230,6 +270,8 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
     const Vector6d d = h.nav.T_map_body.minus(best.nav.T_map_body);
     return d.head<3>().norm() >= kRival_m || d.tail<3>().norm() >= kRival_rad;
   });
+  // The true pose may not be among those of a wide search at all: the best of them has to explain enough.
+  if (workspace_->widely && best.explained < kLeastExplained) return false;
   const double rival_support = rival == hypotheses_.end() ? 0 : rival->mean_support;
   const bool concentrated =
       best.mean_concentration >= kLeastConcentration && best.mean_support >= kLeastLead * rival_support;

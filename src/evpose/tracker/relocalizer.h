@@ -10,6 +10,7 @@
 #include "evpose/imu/strapdown.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/pose_search.h"
+#include "evpose/relocalization/wide_search.h"
 #include "evpose/tracker/event_slice.h"
 #include "evpose/tracker/hypothesis_refiner.h"
 #include "evpose/tracker/pose_hypothesis.h"
@@ -35,10 +36,11 @@ struct RelocalizerInput {
   const Pose& T_body_cam;
 };
 
-/// Finds the pose from a poor guess. In a first slice of events many poses are compared (search_pose()). The
-/// best become hypotheses that are tracked over the next slices, each refined together with its velocity
-/// (HypothesisRefiner). The pose is accepted whose events concentrate at the contours rather than lie evenly
-/// over the gate, and clearly more so than those of any other.
+/// Finds the pose from a poor guess. In a first slice of events many poses are compared (search_pose(), or
+/// WideSearch where metres and headings are unknown). The best become hypotheses that are tracked over the
+/// next slices, each refined together with its velocity (HypothesisRefiner). The pose is accepted whose
+/// events concentrate at the contours rather than lie evenly over the gate, and clearly more so than those of
+/// any other.
 class Relocalizer {
  public:
   /// A start pose known better than this, as image motion, needs no search: the tracker's gate reaches it.
@@ -79,7 +81,9 @@ class Relocalizer {
   struct Workspace {
     explicit Workspace(const RelocalizerScene& scene, const HypothesisMotion& motion);
     EdgeField field;
-    VisibleSet visible;  ///< points for the edges
+    VisibleSet visible;              ///< points for the edges
+    std::optional<WideSearch> wide;  ///< once a prior has asked for it
+    bool widely = false;             ///< this search is one by `wide`
     HypothesisRefiner refiner;
     std::vector<FilteredEvent> compensated;  ///< the slice's events, without rotation
     std::vector<SearchPoint> points;
@@ -88,7 +92,12 @@ class Relocalizer {
   void process_slice(const RelocalizerInput& input);
   void propagate_prior();
   SearchView view_from(const Pose& T_map_body, const Pose& T_body_cam);
+  bool slice_is_complete(TimeNs t) const;
   void search_around_prior(const Pose& T_body_cam, double age_s);
+  void search_widely(const Pose& T_body_cam, double age_s);
+  WidePrior wide_prior() const;
+  void add_hypothesis(const PoseGuess& guess, const Eigen::Vector3d& velocity, const Pose& T_body_cam,
+                      double age_s);
   void update_hypotheses(const Pose& T_body_cam, double age_s);
   PoseHypothesis updated(const PoseHypothesis& predicted, bool refined, const SearchView& view, double age_s);
   PoseHypothesis corrected_by_edges(const PoseHypothesis& predicted, const SearchView& view,

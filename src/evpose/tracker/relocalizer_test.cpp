@@ -102,13 +102,16 @@ class RelocalizerLaws : public ::testing::Test {
 
   /// Searches from a poor start, of unknown velocity, in events of world_, for so long.
   Outcome search(unsigned seed, const ContourMap& map, double seconds) const {
+    return search(PoorStart(seed), kStartSigma_m, kStartSigma_rad, map, seconds);
+  }
+  Outcome search(const PoorStart& start, double sigma_m, double sigma_rad, const ContourMap& map,
+                 double seconds) const {
     const ContourIndex index(map);
     const ContourSegments segments = cut_into_segments(map);
     Relocalizer relocalizer({index, segments, *camera_, {0, 0, -9.81}, visible_, registration_});
-    const PoorStart start(seed);
     Matrix6d covariance = Matrix6d::Zero();
-    covariance.diagonal().head<3>().setConstant(kStartSigma_m * kStartSigma_m);
-    covariance.diagonal().tail<3>().setConstant(kStartSigma_rad * kStartSigma_rad);
+    covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
+    covariance.diagonal().tail<3>().setConstant(sigma_rad * sigma_rad);
     relocalizer.begin_search(time(start.t_s), {start.T_map_body}, covariance);
     for (int i = 0; i * kUpdate_s < seconds; ++i) {
       const double from_s = start.t_s + i * kUpdate_s, to_s = from_s + kUpdate_s;
@@ -203,6 +206,25 @@ TEST_F(RelocalizerLaws, FindsThePoseFromPoorStartsWithinItsSigmas) {
         << "seed " << seed << ": found " << outcome.found << ", off by " << outcome.position_error_m()
         << " m, " << outcome.rotation_error_rad() << " rad, " << outcome.velocity_error_m_s() << " m/s";
   }
+}
+
+TEST_F(RelocalizerLaws, FindsThePoseFromMetresOffWithAnyHeading) {
+  PoorStart start(2);
+  ContourMap map = *world_;  // with something behind the flight: it is searched among the contours
+  test_flight::add_edge(map, {-0.5, 1, 0.2}, {-0.5, 5, 0.2});
+  for (const double heading : {2.1, -0.7}) {
+    start.T_map_body = pose_at(start.t_s);
+    start.T_map_body.p += Eigen::Vector3d(-0.9, 1.1, 0.6);
+    start.T_map_body.q = so3::exp({0, 0, heading}) * start.T_map_body.q;
+    const Outcome outcome = search(start, 1, std::numbers::pi, map, 0.4);
+    EXPECT_TRUE(outcome.within_sigmas())
+        << "heading " << heading << ": found " << outcome.found << ", off by " << outcome.position_error_m()
+        << " m, " << outcome.rotation_error_rad() << " rad, " << outcome.velocity_error_m_s() << " m/s";
+  }
+}
+
+TEST_F(RelocalizerLaws, RefusesTheMapOfAnotherPlaceAtAnyHeading) {
+  EXPECT_FALSE(search(PoorStart(1), 1, std::numbers::pi, *other_, 0.15).found);
 }
 
 TEST_F(RelocalizerLaws, RefusesTheMapOfAnotherPlace) {

@@ -110,6 +110,10 @@ void add_relocalization(CLI::App& bench, Run& run) {
   command->add_option("--threads", request->threads, "starts at a time")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  command
+      ->add_option("--starts", request->classes,
+                   "how the names of the wanted starts begin, as GPS,anywhere; default: all, and wrong maps")
+      ->delimiter(',');
   command->add_flag("!--no-imu", request->imu, "leave the IMU out");
   command->callback(
       [=, &run] { run = [=] { return exit_status(experiments::print_relocalization(*request)); }; });

@@ -16,15 +16,20 @@ namespace {
 constexpr double kWithin_s = 0.5, kLocked_m = 0.01;
 constexpr double kUnknownSpeed_m_s = 0.5, kUnknownRate_rad_s = 0.5;  // 1 sigma of a start at rest
 
-/// How far off a start is, in a random direction.
+/// How far off a start is: by so much in a random direction; with sigmas like those of GPS and a compass; or
+/// nothing is known of it.
+enum class StartError : std::uint8_t { exactly, like_gps, anywhere };
 struct StartClass {
   const char* name;
   double position_m, rotation_deg;
+  StartError error = StartError::exactly;
 };
-constexpr std::array<StartClass, 4> kClasses{{{"5 cm, 0.5 deg", 0.05, 0.5},
+constexpr std::array<StartClass, 6> kClasses{{{"5 cm, 0.5 deg", 0.05, 0.5},
                                               {"10 cm, 2 deg", 0.1, 2},
                                               {"30 cm, 5 deg", 0.3, 5},
-                                              {"50 cm, 10 deg", 0.5, 10}}};
+                                              {"50 cm, 10 deg", 0.5, 10},
+                                              {"GPS-like", 3, 20, StartError::like_gps},
+                                              {"anywhere", 1e3, 180, StartError::anywhere}}};
 
 struct StartOutcome {
   Health health = Health::waiting;
@@ -59,6 +64,16 @@ Eigen::Vector3d direction(std::mt19937& random) {
   return {r * std::cos(a), r * std::sin(a), z};
 }
 
+double normal(std::mt19937& random) {
+  return std::sqrt(-2 * std::log(uniform(random))) * std::cos(2 * M_PI * uniform(random));
+}
+
+Eigen::Vector3d middle_of(const ContourMap& map) {
+  Eigen::AlignedBox3f box;
+  for (const ContourPoint& p : map.points) box.extend(p.position);
+  return map.anchor + box.center().cast<double>();
+}
+
 /// A time at which so much of the recording is left, if it is that long.
 TimeNs random_begin(const std::vector<TimedPose>& truth, double left_s, std::mt19937& random) {
   const TimeNs first = truth.front().t + 10 * kNsPerMs;
@@ -68,11 +83,19 @@ TimeNs random_begin(const std::vector<TimedPose>& truth, double left_s, std::mt1
 
 /// The true pose with an error of that class; neither velocity nor rate is known.
 StartState wrong_start(const std::vector<TimedPose>& truth, TimeNs t, const StartClass& from,
-                       std::mt19937& random) {
+                       const Eigen::Vector3d& middle, std::mt19937& random) {
   StartState state = start_at(truth, t);
-  Vector6d error;
-  error.head<3>() = from.position_m * direction(random);
-  error.tail<3>() = from.rotation_deg * M_PI / 180 * direction(random);
+  const double rotation_rad = from.rotation_deg * M_PI / 180;
+  Vector6d error = Vector6d::Zero();
+  if (from.error == StartError::exactly) {
+    error.head<3>() = from.position_m * direction(random);
+    error.tail<3>() = rotation_rad * direction(random);
+  }
+  if (from.error == StartError::like_gps) {
+    for (int k = 0; k < 3; ++k) state.T_map_body.p[k] += from.position_m * normal(random);
+    state.T_map_body.q = so3::exp({0, 0, rotation_rad * normal(random)}) * state.T_map_body.q;
+  }
+  if (from.error == StartError::anywhere) state.T_map_body = {Eigen::Quaterniond::Identity(), middle};
   state.T_map_body = state.T_map_body.plus(error);
   state.velocity.setZero();
   state.angular_rate_body.setZero();
@@ -80,8 +103,9 @@ StartState wrong_start(const std::vector<TimedPose>& truth, TimeNs t, const Star
 }
 
 TrackerConfig unsure_of_start(TrackerConfig config, const StartClass& from) {
-  config.fusion.start_position_sigma_m = from.position_m / std::sqrt(3);
-  config.fusion.start_rotation_sigma_rad = from.rotation_deg * M_PI / 180 / std::sqrt(3);
+  const double axes = from.error == StartError::exactly ? std::sqrt(3) : 1;
+  config.fusion.start_position_sigma_m = from.position_m / axes;
+  config.fusion.start_rotation_sigma_rad = from.rotation_deg * M_PI / 180 / axes;
   config.fusion.start_velocity_sigma_m_s = kUnknownSpeed_m_s;
   config.fusion.start_angular_rate_sigma_rad_s = kUnknownRate_rad_s;
   return config;
@@ -93,7 +117,7 @@ StartOutcome start(const Streams& streams, const StartClass& from, unsigned seed
   const TimeNs begin = random_begin(truth, kWithin_s, random);
   const TimeNs end = begin + from_seconds(kWithin_s + 0.01);
   const auto [packets, imu] = excerpt(streams, begin, end);
-  const StartState state = wrong_start(truth, begin, from, random);
+  const StartState state = wrong_start(truth, begin, from, middle_of(*streams.job.setup.map), random);
   StartOutcome out;
   auto tracker = Tracker::create(streams.job.setup, unsure_of_start(streams.job.config.tracker, from), state,
                                  processor_s);
@@ -235,8 +259,14 @@ void print_wrong(const std::string& name, const Streams& streams, const std::vec
   }
 }
 
+bool is_wanted(const StartClass& from, const RelocalizationRequest& request) {
+  const auto begins = [&](const std::string& name) { return std::string(from.name).starts_with(name); };
+  return request.classes.empty() || std::any_of(request.classes.begin(), request.classes.end(), begins);
+}
+
 void print_starts(const std::string& name, const Streams& streams, const RelocalizationRequest& request) {
-  for (const StartClass& from : kClasses) print_row(name, from, start_all(streams, from, request));
+  for (const StartClass& from : kClasses)
+    if (is_wanted(from, request)) print_row(name, from, start_all(streams, from, request));
 }
 
 }  // namespace
@@ -264,6 +294,7 @@ Status print_relocalization(const RelocalizationRequest& request) {
       "|\n|---|---|---|---|---|---|---|---|---|---|\n",
       request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);
   for (std::size_t i = 0; i < all.size(); ++i) print_starts((*recordings)[i].name, all[i], request);
+  if (!request.classes.empty()) return {};
   std::printf(
       "\n%d starts each from the true pose, watched for %.1f s, with what cannot be tracked.\n\n"
       "| recording | what is wrong | starts ever called tracking | %% of updates called tracking | %% of "

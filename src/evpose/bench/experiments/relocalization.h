@@ -7,7 +7,8 @@ namespace evpose::experiments {
 
 struct RelocalizationRequest {
   Selection selection;
-  int seeds = 20;  ///< starts of each recording and class of errors
+  int seeds = 20;                    ///< starts of each recording and class of errors
+  std::vector<std::string> classes;  ///< how the names of the wanted ones begin; empty: all, and wrong maps
   int threads = 2;
   bool imu = true;
 };

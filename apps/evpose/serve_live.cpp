@@ -16,6 +16,7 @@
 #include "evpose/io/calibration/kalibr.h"
 #include "evpose/io/files/config_yaml.h"
 #include "evpose/io/maps/map_h5.h"
+#include "evpose/run/start.h"
 #include "evpose/serve/metavision_source.h"
 #include "evpose/serve/packet_source.h"
 #include "interrupt.h"
@@ -233,7 +234,8 @@ void describe(ConfigTable& table, ServeConfig& c) {
 
 Expected<ServeConfig> load_serve_config(const TrackRequest& request) {
   ServeConfig config;
-  config.run.tracker.relocalization.on = false;  // a search takes longer than the data it looks at
+  // A search takes longer than the data it looks at, and only at the start nothing is lost by that.
+  config.run.tracker.relocalization.on = starts_anywhere(request.init);
   config.run.tracker.threads = 2;
   config.run.tracker.events.most_mev_s = 6;  // with which two slow cores keep up
   ConfigTable table;

@@ -19,7 +19,7 @@ class View;
 
 struct BoundaryConfig {
   double least_length_m = 0.12;  ///< of a segment
-  double most_sigma_m = 0.015;   ///< of a segment's place
+  double most_sigma_m = 0.006;   ///< of a segment's place
   double most_blur_noise = 2;    ///< a real edge is no softer than so many times the noise; a shadow's is
 };
 

@@ -17,7 +17,7 @@ class Neighbours;
 struct CreaseConfig {
   double least_angle_rad = 0.35;  ///< between two planes that make a crease
   double least_length_m = 0.08;   ///< of a segment
-  double most_sigma_m = 0.012;    ///< of a segment's place
+  double most_sigma_m = 0.006;    ///< of a segment's place
 };
 
 /// Where two planes meet: segments of the line in which they intersect, as far as both have points up to it.

@@ -13,8 +13,6 @@
 namespace evpose::map_build {
 namespace {
 
-constexpr float kSure_m = 0.006F;  // sigma of contours that stand where they are said to
-
 /// Rms distance across the contour of what was built along a line, and its length.
 std::pair<double, double> across_line(const ContourMap& map, const Eigen::Vector3d& on,
                                       const Eigen::Vector3d& along, double reach_m) {
@@ -22,7 +20,6 @@ std::pair<double, double> across_line(const ContourMap& map, const Eigen::Vector
   for (std::size_t i = 0; i < map.points.size(); ++i) {
     const auto& p = map.points[i];
     const Eigen::Vector3d d = map.position(i) - on, across = d - along * along.dot(d);
-    if (p.sigma > kSure_m) continue;
     if (std::abs(p.tangent.cast<double>().dot(along)) < 0.95 || across.norm() > reach_m) continue;
     squares += across.squaredNorm() * static_cast<double>(p.length);
     length += static_cast<double>(p.length);
@@ -168,7 +165,7 @@ TEST(MapBuilder, AFrontThatEndsAboveTheFloorHasNoEdgeWithIt) {
       for (std::size_t i = 0; i < built->map.points.size(); ++i) {
         const ContourPoint& p = built->map.points[i];
         const Eigen::Vector3d x = built->map.position(i);
-        if (p.kind == ContourKind::crease && p.sigma < kSure_m && std::hypot(x.y(), x.z()) < 0.02)
+        if (p.kind == ContourKind::crease && std::hypot(x.y(), x.z()) < 0.02)
           length += static_cast<double>(p.length);
       }
       if (from_m > 0)

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "evpose/core/config.h"
+#include "evpose/core/log.h"
 
 namespace evpose {
 namespace {
@@ -36,7 +37,7 @@ constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
 constexpr double kLeastLead = 1.15;                    // over the next pose, in support
-constexpr double kLeastExplained = 0.055;              // of all events, beyond an even spread; wide searches
+constexpr double kLeastExplained = 0.06;               // of all events, beyond an even spread; wide searches
 constexpr double kClearLead = 2;                       // makes a low concentration enough
 constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
 
@@ -286,6 +287,9 @@ std::optional<Relocalizer::Found> Relocalizer::accept_best() {
   if (!hypotheses_.empty()) {
     const PoseHypothesis& best = hypotheses_.front();
     if (is_accepted(best)) {
+      const Eigen::Vector3d& p = best.nav.T_map_body.p;
+      log_detail(text("pose found at ", p.x(), ", ", p.y(), ", ", p.z(), " m: ", best.support, " events, ",
+                      100 * best.explained, " % of all, concentration ", best.mean_concentration));
       searching_ = false;
       return Found{best.nav, motion_.angular_rate(best, angular_rate_)};
     }

@@ -240,8 +240,10 @@ void TileWriter::add_plane(std::size_t p) {
 
 void TileWriter::add_all() {
   for (const LineSegment& crease : found_.creases) {
-    if (!crease.doubtful) add(crease);
-    if (crease.doubtful) figures_.left_out_m += crease.length_m();
+    if (crease.doubtful)
+      figures_.left_out_m += crease.length_m();
+    else
+      add(crease);
   }
   for (std::size_t p = 0; p < found_.planes.planes.size(); ++p) add_plane(p);
   for (const Cylinder& cylinder : found_.cylinders) {

@@ -13,7 +13,14 @@ constexpr float kNearest_m = 0.05F;  // points nearer to the camera are not proj
 constexpr double kMargin_px = 2;
 constexpr int kDirections = EdgeField::kDirections;
 
-/// Tangents of the half angles of view.
+/// A direction by its number: evenly along the sides of a square, which needs no arc tangent.
+Eigen::Vector2d direction_of(int number) {
+  const double turn = 2.0 * number / kDirections;  // 0 .. 2
+  return turn < 1 ? Eigen::Vector2d(1 - turn, turn) : Eigen::Vector2d(1 - turn, 2 - turn);
+}
+
+}  // namespace
+
 Eigen::Vector2d half_view(const Camera& camera) {
   Eigen::Vector2d widest(0.1, 0.1);
   const ImageSize size = camera.size();
@@ -24,14 +31,6 @@ Eigen::Vector2d half_view(const Camera& camera) {
     }
   return widest.cwiseMin(kWidestTan);
 }
-
-/// A direction by its number: evenly along the sides of a square, which needs no arc tangent.
-Eigen::Vector2d direction_of(int number) {
-  const double turn = 2.0 * number / kDirections;  // 0 .. 2
-  return turn < 1 ? Eigen::Vector2d(1 - turn, turn) : Eigen::Vector2d(1 - turn, 2 - turn);
-}
-
-}  // namespace
 
 CoarseScores::CoarseScores(const EdgeField& field, const Camera& camera, float seen_share,
                            float outside_score)

@@ -9,6 +9,9 @@
 
 namespace evpose {
 
+/// Tangents of the half angles of view; of an image that is wider than 2.5, the rim is left out.
+Eigen::Vector2d half_view(const Camera& camera);
+
 /// Score of a contour point by where it is seen, and in which direction, for a camera without distortion: one
 /// look-up. It is made from an edge field and is as coarse as EdgeSpread::coarse allows.
 class CoarseScores {

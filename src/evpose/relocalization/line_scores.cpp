@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/registration/coarse_ranking.h"
+
 namespace evpose {
 namespace {
 
 constexpr double kCellsPerSpread = 1.6;  // of the table
-constexpr double kWidestTan = 2.5;       // of an image that is wider, the rim is left out
 constexpr float kSeenShare = 0.3F;       // of the contours in view, motion makes so many visible
 constexpr float kOutsideScore = -0.3F;
 constexpr float kNearest_m = 0.1F;
@@ -29,17 +30,6 @@ Ints load(const std::int32_t* from) {
   Ints out;
   std::copy_n(from, kSide, reinterpret_cast<std::int32_t*>(&out));
   return out;
-}
-
-Eigen::Vector2d half_view_of(const Camera& camera) {
-  Eigen::Vector2d widest(0.1, 0.1);
-  const ImageSize size = camera.size();
-  for (const double u : {0.0, 0.5, 1.0})
-    for (const double v : {0.0, 0.5, 1.0}) {
-      const auto ray = camera.unproject({u * (size.width - 1), v * (size.height - 1)});
-      if (ray && ray->z() > 0.1) widest = widest.cwiseMax((ray->head<2>() / ray->z()).cwiseAbs());
-    }
-  return widest.cwiseMin(kWidestTan);
 }
 
 }  // namespace
@@ -67,7 +57,7 @@ int LineScores::direction(float x, float y) {
 }
 
 LineScores::LineScores(std::span<const EdgeLine> lines, const Camera& camera, double spread)
-    : half_view_(half_view_of(camera)), cells_per_unit_(static_cast<float>(kCellsPerSpread / spread)) {
+    : half_view_(evpose::half_view(camera)), cells_per_unit_(static_cast<float>(kCellsPerSpread / spread)) {
   columns_ = 2 * static_cast<int>(std::ceil(half_view_.x() * cells_per_unit_)) + 3;
   rows_ = 2 * static_cast<int>(std::ceil(half_view_.y() * cells_per_unit_)) + 3;
   const auto plane = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);

@@ -22,7 +22,6 @@ namespace {
 using namespace evpose;
 
 constexpr TimeNs kIdle = 5 * kNsPerMs;
-constexpr double kAgainSigma = 0.03;  // m and rad, of a pose that is some time old
 
 struct Setup {
   TrackerSetup tracker;
@@ -74,7 +73,6 @@ Expected<Setup> read_setup(const Parameters& parameters) {
   fusion.start_velocity_sigma_m_s = std::max(fusion.start_velocity_sigma_m_s, 0.5);
   fusion.start_angular_rate_sigma_rad_s = std::max(fusion.start_angular_rate_sigma_rad_s, 0.5);
   ConfigTable table;
-  out.config.relocalization.on = false;  // a search takes longer than the data it looks at
   describe(table, out.config);
   for (const std::string& setting : parameters.settings) {
     const auto equals = setting.find('=');
@@ -103,15 +101,13 @@ class TrackingEngine : public Engine {
         callbacks_(std::move(callbacks)),
         queue_({}),
         session_(
-            {}, setup_.has_imu, setup_.start, std::nullopt,
-            [this](const StartState& start, bool again) { return make(start, again); },
+            session_config(), setup_.has_imu, {setup_.start}, std::nullopt,
+            [this](const TrackerStart& start) { return make(start); },
             {[this](const Update& u, TimeNs, const Tracker&) { add(u); }, [](const std::string&) {},
              [](const std::string&) {}, [this](const std::string& words) { callbacks_.notice(words); }}) {}
 
-  Expected<std::unique_ptr<Tracker>> make(const StartState& start, bool again) const {
-    TrackerConfig config = setup_.config;
-    if (again) config.fusion.start_position_sigma_m = config.fusion.start_rotation_sigma_rad = kAgainSigma;
-    return Tracker::create(setup_.tracker, config, start);
+  Expected<std::unique_ptr<Tracker>> make(const TrackerStart& start) const {
+    return make_tracker(setup_.tracker, setup_.config, start);
   }
   const StartState& start() const { return setup_.start; }
 
@@ -179,6 +175,11 @@ class TrackingEngine : public Engine {
   }
 
  private:
+  SessionConfig session_config() const {
+    SessionConfig out;
+    out.search = setup_.config.relocalization;
+    return out;
+  }
   void add(const Update& u) {
     health_ = u.health;
     if (!u.reason.empty()) reason_ = u.reason;
@@ -206,7 +207,7 @@ std::unique_ptr<Engine> Engine::create(const Parameters& parameters, const Callb
   auto setup = read_setup(parameters);
   if (!setup) return error = setup.error().line(), nullptr;
   auto engine = std::make_unique<TrackingEngine>(std::move(*setup), callbacks);
-  if (const auto possible = engine->make(engine->start(), false); !possible)
+  if (const auto possible = engine->make({engine->start()}); !possible)
     return error = possible.error().line(), nullptr;
   return engine;
 }

@@ -19,17 +19,16 @@
 #include "evpose/run/start.h"
 #include "evpose/serve/metavision_source.h"
 #include "evpose/serve/packet_source.h"
+#include "evpose/serve/tracker_start.h"
+#include "evpose/tracker/tracker_parts.h"
 #include "interrupt.h"
 #include "serve_outputs.h"
 
 namespace evpose {
 namespace {
 
-constexpr TimeNs kIdle = 5 * kNsPerMs;     // the longest wait for data before the links are serviced
-constexpr double kAgainPosition_m = 0.03;  // of a pose that is some time old
-constexpr double kAgainRotation_rad = 0.02;
-constexpr double kAgainSpeed_m_s = 0.5;
-constexpr double kLateShare = 0.01;  // of the poses, from which on it is said
+constexpr TimeNs kIdle = 5 * kNsPerMs;  // the longest wait for data before the links are serviced
+constexpr double kLateShare = 0.01;     // of the poses, from which on it is said
 
 volatile std::sig_atomic_t g_reset = 0;
 void ask_reset(int) { g_reset = 1; }
@@ -103,23 +102,20 @@ class TrackerMaker {
  public:
   static Expected<TrackerMaker> create(const TrackJob& job) {
     TrackerMaker out(job);
-    auto first = out.make(job.start, false);
+    auto first = out.make(out.first_start());
     if (!first) return first.error();
     out.first_ = std::move(*first);
     return out;
   }
 
-  /// `again`: from a pose that is some time old, and so uncertain.
-  Expected<std::unique_ptr<Tracker>> make(const StartState& start, bool again) {
-    if (first_ && !again && start.t == job_->start.t) return std::move(first_);
-    TrackerConfig config = job_->config.tracker;
-    if (again) {
-      FusionConfig& fusion = config.fusion;
-      fusion.start_position_sigma_m = std::max(fusion.start_position_sigma_m, kAgainPosition_m);
-      fusion.start_rotation_sigma_rad = std::max(fusion.start_rotation_sigma_rad, kAgainRotation_rad);
-      fusion.start_velocity_sigma_m_s = std::max(fusion.start_velocity_sigma_m_s, kAgainSpeed_m_s);
-    }
-    return Tracker::create(job_->setup, config, start, wall_s);
+  TrackerStart first_start() const {
+    const FusionConfig& fusion = job_->config.tracker.fusion;
+    return {job_->start, fusion.start_position_sigma_m, fusion.start_rotation_sigma_rad};
+  }
+  /// Searching trackers may be made on other threads.
+  Expected<std::unique_ptr<Tracker>> make(const TrackerStart& start) {
+    if (!start.searches && first_ && start.state.t == job_->start.t) return std::move(first_);
+    return make_tracker(job_->setup, job_->config.tracker, start, wall_s);
   }
 
  private:
@@ -128,6 +124,14 @@ class TrackerMaker {
   const TrackJob* job_;
   std::unique_ptr<Tracker> first_;
 };
+
+/// Of the settings and what they say of other parts.
+SessionConfig session_config(const ServeConfig& config, const TrackJob& job) {
+  SessionConfig out = config.session;
+  out.search = relocalization_config(job.config.tracker);
+  out.waits = !config.queue.shed;
+  return out;
+}
 
 /// Hands what the source brings to the session, and services the outputs, until the source ends or the
 /// program is interrupted.
@@ -159,6 +163,9 @@ void print_outcome(const Session& session, const StreamQueue& queue, const Outpu
               static_cast<unsigned long long>(c.updates), static_cast<unsigned long long>(c.restarts),
               static_cast<unsigned long long>(c.stalls));
   if (c.updates > 0) std::printf("updates: %s\n", outputs.healths().c_str());
+  if (c.searches > 0)
+    std::printf("searches for the pose: %llu, found %llu times\n",
+                static_cast<unsigned long long>(c.searches), static_cast<unsigned long long>(c.found));
   std::printf("events: %llu arrived, %llu shed, %llu late; most waiting at once %llu\n",
               static_cast<unsigned long long>(q.events_in),
               static_cast<unsigned long long>(q.events_shed + c.events_shed + thinned),
@@ -190,7 +197,9 @@ Expected<RunOutcome> finish(RunFolder& run, const TrackJob& job, const ServeRequ
                             ServeConfig& config, const Session& session, const StreamQueue& queue,
                             const Beginning& begin) {
   if (session.counts().updates == 0 || session.tracker() == nullptr)
-    return Error{request.track.recording, "the stream ended before the first update",
+    return Error{request.track.recording,
+                 session.counts().searches > 0 ? "the stream ended before the pose was found"
+                                               : "the stream ended before the first update",
                  "check that events and IMU arrive and cover the start"};
   RunSummary summary = summarise(job, request.track, *session.tracker(), session.tracker()->calibration());
   summary.events_read = session.counts().events - session.counts().events_shed;
@@ -234,8 +243,6 @@ void describe(ConfigTable& table, ServeConfig& c) {
 
 Expected<ServeConfig> load_serve_config(const TrackRequest& request) {
   ServeConfig config;
-  // A search takes longer than the data it looks at, and only at the start nothing is lost by that.
-  config.run.tracker.relocalization.on = starts_anywhere(request.init);
   config.run.tracker.threads = 2;
   config.run.tracker.events.most_mev_s = 6;  // with which two slow cores keep up
   ConfigTable table;
@@ -264,9 +271,9 @@ Expected<int> serve(const ServeRequest& request) {
   Outputs outputs(*config, *job, *placement);
   if (auto ok = outputs.open(request, *config, *job); !ok) return ok.error();
 
-  Session session(config->session, job->recording.has_imu, job->start,
+  Session session(session_config(*config, *job), job->recording.has_imu, maker->first_start(),
                   live ? std::nullopt : std::optional(job->start.t),
-                  [&](const StartState& start, bool again) { return maker->make(start, again); },
+                  [&](const TrackerStart& start) { return maker->make(start); },
                   {[&](const Update& u, TimeNs offset, Tracker& tracker) { outputs.add(u, offset, tracker); },
                    [&](const std::string& why) { outputs.restarted(why); },
                    [&](const std::string& what) { outputs.stalled(what); },

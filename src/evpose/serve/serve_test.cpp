@@ -310,14 +310,16 @@ class SessionStory : public testing::Test {
   }
 
   Session session(std::optional<TimeNs> start_at = std::nullopt) {
-    return {{},
+    SessionConfig config;
+    config.search.on = false;
+    return {config,
             true,
-            StartState{},
+            TrackerStart{},
             start_at,
-            [this](const StartState& start, bool again) {
-              starts_.push_back(start);
-              again_.push_back(again);
-              return Tracker::create(setup_, {}, start);
+            [this](const TrackerStart& start) {
+              starts_.push_back(start.state);
+              sigma_m_.push_back(start.position_sigma_m);
+              return make_tracker(setup_, {}, start);
             },
             {[this](const Update& u, TimeNs offset, const Tracker&) {
                updates_.push_back(u.t);
@@ -347,7 +349,7 @@ class SessionStory : public testing::Test {
 
   TrackerSetup setup_;
   std::vector<StartState> starts_;
-  std::vector<bool> again_;
+  std::vector<double> sigma_m_;
   std::vector<TimeNs> updates_;
   std::vector<std::string> restarts_, stalls_, notices_;
   TimeNs offset_ = 0;
@@ -446,7 +448,7 @@ TEST_F(SessionStory, ResetGoesBackToTheStartPose) {
   feed(s, 0, kNsPerS);
   ASSERT_EQ(starts_.size(), 2u);
   EXPECT_EQ(starts_[1].t, 2 * kNsPerMs);
-  EXPECT_FALSE(again_[1]);
+  EXPECT_EQ(sigma_m_[1], 0) << "as well known as at first";
   EXPECT_EQ(s.counts().restarts, 1u);
 }
 

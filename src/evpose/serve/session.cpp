@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "evpose/core/config.h"
 
@@ -12,6 +13,22 @@ namespace {
 constexpr std::size_t kBefore = 2000;           // IMU samples kept before there is a tracker
 constexpr TimeNs kLate = 10 * kNsPerMs;         // what is later than this is a clock that went back
 constexpr TimeNs kOffsetWindow = 10 * kNsPerS;  // the shortest way of this time tells the clocks' offset
+
+// Of a pose that is some time old. By then it may have moved on, at any speed.
+constexpr double kAgainPosition_m = 0.03, kAgainRotation_rad = 0.02, kAgainSpeed_m_s = 0.5;
+constexpr double kMovedOn_m_s = 1, kMostMovedOn_m = 5;
+
+// Searches for a pose, one after the other: around where it should be, as by GPS and compass, anywhere. The
+// first two for so long, of data.
+constexpr int kAround = 0, kByGps = 1, kAnywhere = 2;
+constexpr TimeNs kLongest[] = {4 * kNsPerS, 12 * kNsPerS};
+constexpr double kGps_m = 3, kCompass_rad = 0.35, kAnywhere_m = 1e3, kAnywhere_rad = M_PI;
+
+int width_of(const TrackerStart& start) {
+  return start.position_sigma_m < kGps_m        ? kAround
+         : start.position_sigma_m < kAnywhere_m ? kByGps
+                                                : kAnywhere;
+}
 
 }  // namespace
 
@@ -24,7 +41,7 @@ void describe(ConfigTable& table, SessionConfig& c) {
   table.add("wait_imu_s", c.wait_imu_s, "s", "events further ahead of the IMU are shed", {0.001, 10});
 }
 
-Session::Session(const SessionConfig& config, bool has_imu, const StartState& start,
+Session::Session(const SessionConfig& config, bool has_imu, const TrackerStart& start,
                  std::optional<TimeNs> start_at, MakeTracker make, Hooks hooks)
     : config_(config),
       has_imu_(has_imu),
@@ -74,13 +91,18 @@ void Session::tick(TimeNs now_ns) {
 
 void Session::reset(const std::string& why) { restart(why, false); }
 
+void Session::count_tracker() {
+  if (!tracker_) return;
+  counts_.events_kept += static_cast<std::uint64_t>(tracker_->events().counts().kept);
+  counts_.events_thinned += static_cast<std::uint64_t>(tracker_->events().counts().shed);
+}
+
 void Session::restart(const std::string& why, bool from_last) {
-  if (tracker_) {
-    counts_.events_kept += static_cast<std::uint64_t>(tracker_->events().counts().kept);
-    counts_.events_thinned += static_cast<std::uint64_t>(tracker_->events().counts().shed);
-  }
+  count_tracker();
   tracker_.reset();
+  end_search();
   before_.clear();
+  const TimeNs was_at = events_.last;
   events_.last = imu_.last = std::numeric_limits<TimeNs>::min();
   has_offset_ = false;
   window_end_ = std::numeric_limits<TimeNs>::min();
@@ -90,9 +112,8 @@ void Session::restart(const std::string& why, bool from_last) {
   next_ = start_;
   start_at_ = again_ ? std::nullopt : first_start_at_;
   if (again_) {
-    next_.T_map_body = last_valid_->T_map_body;
-    next_.velocity.setZero();  // nobody knows what happened meanwhile
-    next_.angular_rate_body.setZero();
+    next_ = {{was_at, last_valid_->T_map_body}, kAgainPosition_m, kAgainRotation_rad, kAgainSpeed_m_s};
+    // Nobody knows how it moved meanwhile.
   }
   last_valid_.reset();
   hooks_.notice("restarted: " + why);
@@ -156,8 +177,8 @@ void Session::take_imu(const std::vector<ImuSample>& samples, TimeNs now_ns) {
     }
     imu_.last = sample.t;
     ++counts_.imu;
-    if (tracker_) {
-      tracker_->add_imu(sample);
+    if (tracker_ || searching_) {
+      add_sample(sample);
       continue;
     }
     before_.push_back(sample);
@@ -165,33 +186,126 @@ void Session::take_imu(const std::vector<ImuSample>& samples, TimeNs now_ns) {
   }
 }
 
-bool Session::create(const StartState& start) {
-  auto made = make_(start, again_);
+bool Session::create(TrackerStart start) {
+  auto made = make_(start);
   if (!made) {
     if (!refused_) hooks_.notice(made.error().line());
     refused_ = true;
     return false;
   }
-  tracker_ = std::move(*made);
-  tracker_->on_update([this](const Update& u) {
-    ++counts_.updates;
-    if (u.health == Health::tracking || u.health == Health::degraded) last_valid_ = u;
-    hooks_.update(u, offset_, *tracker_);
-  });
-  for (const ImuSample& sample : before_) tracker_->add_imu(sample);
+  if (again_ || !config_.search.on || !(*made)->needs_search()) use(std::move(*made));
+  if (config_.search.on && (again_ || !tracker_)) {
+    // After a gap whichever is tracking first: this one, or one that is not where it was.
+    if (again_) start = moved_on(start);
+    width_ = width_of(start);
+    search(start);
+  }
+  for (const ImuSample& sample : before_) add_sample(sample);
   before_.clear();
   return true;
 }
 
+/// A start from where it was when the data ended.
+TrackerStart Session::moved_on(TrackerStart start) const {
+  const double gap_s = std::max(0.0, to_seconds(start.state.t - next_.state.t));
+  start.position_sigma_m = config_.search.position_sigma_m + std::min(kMostMovedOn_m, kMovedOn_m_s * gap_s);
+  start.rotation_sigma_rad = config_.search.rotation_sigma_rad;
+  return start;
+}
+
+/// From now on the poses are those of this one.
+void Session::use(std::unique_ptr<Tracker> tracker) {
+  tracker_ = std::move(tracker);
+  tracker_->on_update([this](const Update& u) {
+    ++counts_.updates;
+    tracks_ = u.health == Health::tracking;
+    if (tracks_ || u.health == Health::degraded) last_valid_ = u;
+    hooks_.update(u, offset_, *tracker_);
+  });
+}
+
+/// Where the pose should be, at the width of the next search.
+TrackerStart Session::where_to_search() const {
+  TrackerStart out = start_;
+  if (width_ == kAround && tracker_) {
+    const FusionState& state = tracker_->state();
+    const Vector6d variance = state.pose_covariance().diagonal();
+    const auto sigma = [](double of_search, double variances) {
+      return std::hypot(of_search, std::sqrt(variances));
+    };
+    out = {{0, state.nav.T_map_body, state.nav.velocity},
+           sigma(config_.search.position_sigma_m, variance.head<3>().maxCoeff()),
+           sigma(config_.search.rotation_sigma_rad, variance.tail<3>().maxCoeff())};
+  } else if (last_valid_) {
+    out = {{0, last_valid_->T_map_body}};
+  }
+  if (width_ >= kByGps) {
+    out.position_sigma_m = width_ == kAnywhere ? kAnywhere_m : kGps_m;
+    out.rotation_sigma_rad = width_ == kAnywhere ? kAnywhere_rad : kCompass_rad;
+  }
+  out.state.t = has_imu_ ? std::max(events_.last, imu_.last) : events_.last;
+  return out;
+}
+
+void Session::search(TrackerStart from) {
+  from.searches = true;
+  searching_ = true;
+  search_began_ = from.state.t;
+  ++counts_.searches;
+  recovery_ = std::make_unique<Recovery>([make = make_, from] { return make(from); }, config_.waits);
+}
+
+/// Its thread may be in the middle of something.
+void Session::give_up_search() {
+  if (!recovery_) return;
+  recovery_->give_up();
+  given_up_.push_back(std::move(recovery_));
+}
+
+void Session::end_search() {
+  give_up_search();
+  searching_ = tracks_ = false;
+  width_ = kAround;
+}
+
+/// Takes what a search has found, begins one when the pose is lost, and ends it when it is there again.
+void Session::mind_search() {
+  std::erase_if(given_up_, [](const auto& r) { return r->ended(); });
+  if (auto found = recovery_ ? recovery_->take() : nullptr) {
+    count_tracker();
+    use(std::move(found));
+    end_search();
+    ++counts_.found;
+    hooks_.notice("the pose was found");
+    hooks_.restarted("the pose was found");
+  } else if (recovery_ && tracker_ && tracks_) {
+    end_search();
+  } else if (recovery_) {
+    const bool long_enough =
+        width_ < kAnywhere && has_imu_ && events_.last - search_began_ > kLongest[width_];
+    if (!long_enough && !recovery_->failed()) return;
+    give_up_search();
+    if (has_imu_) width_ = std::min(width_ + 1, kAnywhere);
+  } else if (config_.search.on && (searching_ || (tracker_ && tracker_->needs_search())) &&
+             given_up_.empty()) {
+    search(where_to_search());
+  }
+}
+
+void Session::add_sample(const ImuSample& sample) {
+  if (tracker_) tracker_->add_imu(sample);
+  if (recovery_) recovery_->add_imu(sample);
+}
+
 bool Session::begin(TimeNs first_event) {
-  if (tracker_) return true;
-  StartState start = next_;
+  if (tracker_ || searching_) return true;
+  TrackerStart start = next_;
   if (start_at_) {
-    start.t = *start_at_;
+    start.state.t = *start_at_;
     return create(start);
   }
   if (has_imu_ && before_.empty()) return false;
-  start.t = has_imu_ ? std::max(first_event, before_.front().t) : first_event;
+  start.state.t = has_imu_ ? std::max(first_event, before_.front().t) : first_event;
   return create(start);
 }
 
@@ -215,7 +329,9 @@ void Session::take_events(EventPacket& packet, TimeNs now_ns) {
     return;
   }
   shedding_ = false;
-  tracker_->add_events(packet);
+  if (tracker_) tracker_->add_events(packet);
+  if (recovery_) recovery_->add_events(packet);
+  mind_search();
 }
 
 }  // namespace evpose

@@ -22,8 +22,8 @@ constexpr const char* kContradiction =
 void PoseSupervisor::start(const FusionState& first, double sigma_px) {
   health_.start(first.t);
   before_search_ = first;
-  if (config_.on && sigma_px > Relocalizer::kSearchAboveSigma_px)
-    relocalizer_.begin_search(first.t, first.nav, first.pose_covariance());
+  start_is_unsure_ = sigma_px > Relocalizer::kSearchAboveSigma_px;
+  if (config_.on && start_is_unsure_) relocalizer_.begin_search(first.t, first.nav, first.pose_covariance());
 }
 
 std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input, const BackEnd& fusion) {
@@ -91,7 +91,7 @@ bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const
   return (refuted && !(verified_ && map_may_be_wrong_)) || (health == Health::lost && !verifying());
 }
 
-bool PoseSupervisor::search_is_due() const { return config_.on && !searching() && astray_s_ > kPatience_s; }
+bool PoseSupervisor::is_astray_for_long() const { return astray_s_ > kPatience_s; }
 
 std::string PoseSupervisor::refusal(TimeNs t, const RegistrationResult& r, double innovation) const {
   if (searching() || found_pose_is_refuted(t, r)) return "searching for the pose";
@@ -149,7 +149,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   astray_s_ = !e.frames_confirm && is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
   if (verification_is_over(e.t) && (verified_ || refuted)) verify_until_ = 0;
   if (refuted) resume_search(e.t, fusion);
-  if (search_is_due()) begin_search(e.t, fusion, state.pose_covariance());
+  if (config_.on && !searching() && is_astray_for_long()) begin_search(e.t, fusion, state.pose_covariance());
   return health;
 }
 

@@ -44,6 +44,13 @@ class PoseSupervisor {
 
   /// The pose is being searched: there is none to measure at.
   bool searching() const { return relocalizer_.searching(); }
+  /// The pose has to be searched, and is not: the start is too unsure, or the pose has been lost or refuted
+  /// for long.
+  bool needs_search() const {
+    return !searching() && ((start_is_unsure_ && !verified_) || is_astray_for_long());
+  }
+  /// From now on a pose that gets lost is left to needs_search().
+  void search_no_more() { config_.on = false; }
   /// One update's part of the search, or of watching a pose that was found. The state from which tracking
   /// begins anew, once it is found.
   std::optional<FusionState> search(const RelocalizerInput& input, const BackEnd& fusion);
@@ -83,7 +90,7 @@ class PoseSupervisor {
   bool is_contradicted() const;
   bool is_hopeless() const;
   bool is_astray(const RegistrationResult& registration, Health health) const;
-  bool search_is_due() const;
+  bool is_astray_for_long() const;
   void resume_search(TimeNs t, BackEnd& fusion);
   void begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance);
 
@@ -98,7 +105,8 @@ class PoseSupervisor {
   double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map
   double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
   double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it
-  bool verified_ = false;      ///< the events have confirmed the pose since it was given or found
+  bool start_is_unsure_ = false;
+  bool verified_ = false;  ///< the events have confirmed the pose since it was given or found
 };
 
 }  // namespace evpose

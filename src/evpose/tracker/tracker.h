@@ -97,6 +97,11 @@ class Tracker {
   /// From now on a time surface is kept for snapshots, or no longer.
   void keep_time_surface(bool on) { preprocessor_.keep_surface(on || registration_->reads_surface()); }
 
+  /// The pose is being searched, and nothing measured meanwhile.
+  bool searching() const { return supervisor_.searching(); }
+  /// It has to be searched, and is not: relocalization.on is off, or search_no_more() was called.
+  bool needs_search() const { return supervisor_.needs_search(); }
+  void search_no_more() { supervisor_.search_no_more(); }
   /// The newest state, with its covariance.
   const FusionState& state() const { return fusion_->state(); }
   const EventPreprocessor& events() const { return preprocessor_; }

@@ -103,7 +103,9 @@ std::shared_ptr<const ContourMap> check_map(Checklist& list, const TrackRequest&
 void check_start(Checklist& list, const TrackRequest& request, const CheckedRecording& data,
                  const ContourMap& map) {
   FusionConfig config;
-  const auto start = choose_start(request.init, data.recording, data.truth, {}, &config);
+  const auto placement = read_map_placement(map.source);
+  if (!placement) return list.problem("start", placement.error());
+  const auto start = choose_start(request.init, data.recording, data.truth, {}, *placement, &config);
   if (!start) return list.problem("start", start.error());
   const int before = list.problems();
   if (const auto doubt = doubt_start_place(map, start->T_map_body)) list.problem("start", *doubt);

@@ -18,7 +18,8 @@ void add_input_options(CLI::App& command, TrackRequest& request, const std::stri
   command.add_option("--occluders", request.occluders,
                      "PLY mesh that hides contours behind it; default: the map's own");
   command.add_option("--init", request.init,
-                     "start: groundtruth, anywhere, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file; default: ground "
+                     "start: groundtruth, anywhere, gps:LAT,LON,ALT[,SIGMA], x,y,z,qx,qy,qz,qw[@t_s], or a "
+                     "TUM file; default: ground "
                      "truth if there is one, else the recording's initial_pose");
   command
       .add_option("--init-sigma", request.init_sigma,

@@ -50,8 +50,9 @@ void add_serve(CLI::App& app, std::function<int()>& run) {
   command->add_option("--imu-model", track.imu_model,
                       "the IMU's noise and axes as Kalibr writes them; default: the recording's imu.yaml");
   command->add_option("--occluders", track.occluders, "PLY mesh that hides contours behind it");
-  command->add_option("--init", track.init,
-                      "start: groundtruth, anywhere, x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
+  command->add_option(
+      "--init", track.init,
+      "start: groundtruth, anywhere, gps:LAT,LON,ALT[,SIGMA], x,y,z,qx,qy,qz,qw[@t_s], or a TUM file");
   command
       ->add_option("--init-sigma", track.init_sigma,
                    "how far off the given pose may be, m and deg per axis: it is searched there")

@@ -41,8 +41,6 @@ Matrix6d rotate_blocks(const Matrix6d& covariance, const Eigen::Matrix3d& R_posi
 
 }  // namespace
 
-Eigen::Matrix3d rotation_ned_enu() { return (Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished(); }
-
 Eigen::Matrix3d rotation_frd_flu() { return Eigen::Vector3d(1, -1, -1).asDiagonal(); }
 
 Pose ned_from_heading(double map_x_heading_rad) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "evpose/core/geodesy.h"
 #include "evpose/core/pose.h"
 #include "evpose/tracker/update.h"
 
@@ -8,8 +9,6 @@ namespace evpose {
 
 // The one place where the estimate leaves its own frames (design.md 2: map z up; body = IMU).
 
-/// Rows n, e, d of a map whose x points east, y north and z up.
-Eigen::Matrix3d rotation_ned_enu();
 /// Forward-right-down from forward-left-up, and back.
 Eigen::Matrix3d rotation_frd_flu();
 /// T_ned_map of a level map whose x axis has this compass heading (90: east, so that the map is ENU).

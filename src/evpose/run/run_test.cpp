@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include "evpose/core/geodesy.h"
 #include "evpose/run/plausibility.h"
 #include "evpose/run/progress.h"
 #include "evpose/run/start.h"
@@ -104,6 +105,52 @@ TEST(Start, WordsTellWhereThePoseComesFrom) {
   EXPECT_EQ(start_words("1,2,3,0,0,0,1", true), "started from --init");
   EXPECT_EQ(start_words("a.tum", true), "started from a.tum");
   EXPECT_EQ(start_words("anywhere", true), "started anywhere in the map");
+  EXPECT_EQ(start_words("gps:1,2,3", true), "started from a place by GPS");
+}
+
+class StartByGps : public testing::Test {
+ protected:
+  StartByGps() {
+    recording_.has_imu = true;
+    recording_.first_ns = 7;
+    placement_.origin_llh = Eigen::Vector3d(47.4, 8.5, 400);
+  }
+  Expected<StartState> start(const std::string& init) {
+    return choose_start(init, recording_, {}, {}, placement_, &fusion_);
+  }
+
+  Recording recording_;
+  MapPlacement placement_;
+  FusionConfig fusion_;
+};
+
+TEST_F(StartByGps, IsEastAndNorthOfTheMapsOrigin) {
+  const auto s = start("gps:47.4001,8.5002,412");
+  ASSERT_TRUE(s);
+  const Eigen::Vector3d ned = ned_from_llh({47.4001, 8.5002, 412}, *placement_.origin_llh);
+  EXPECT_LT((s->T_map_body.p - Eigen::Vector3d(ned.y(), ned.x(), -ned.z())).norm(), 1e-9);
+  EXPECT_NEAR(s->T_map_body.p.y(), 11.1, 0.1) << "a ten-thousandth of a degree of latitude";
+  EXPECT_EQ(s->t, 7);
+  EXPECT_EQ(fusion_.start_position_sigma_m, kGpsSigma_m);
+}
+
+TEST_F(StartByGps, WhereThePlacedMapHasIt) {
+  placement_.T_ned_map = Pose{so3::exp({0.1, 0.2, 0.3}), {4, 5, 6}};
+  const auto s = start("gps:47.4001,8.5002,412,1.5");
+  ASSERT_TRUE(s);
+  const Eigen::Vector3d ned = ned_from_llh({47.4001, 8.5002, 412}, *placement_.origin_llh);
+  EXPECT_LT((*placement_.T_ned_map * s->T_map_body.p - ned).norm(), 1e-9);
+  EXPECT_EQ(fusion_.start_position_sigma_m, 1.5);
+}
+
+TEST_F(StartByGps, SaysWhatIsWrong) {
+  for (const char* words : {"gps:", "gps:1,2", "gps:1,2,3,4,5", "gps:91,0,0", "gps:1,2,3,", "gps:1,2,3,0",
+                            "gps:a,b,c", "gps:1 2 3", "gps:nan,2,3"})
+    EXPECT_FALSE(start(words)) << words;
+  placement_.origin_llh.reset();
+  EXPECT_NE(start("gps:47.4,8.5,412").error().line().find("not placed"), std::string::npos);
+  recording_.has_imu = false;
+  EXPECT_NE(start("gps:47.4,8.5,412").error().line().find("no IMU"), std::string::npos);
 }
 
 }  // namespace

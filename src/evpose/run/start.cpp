@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "evpose/core/geodesy.h"
 #include "evpose/io/motion/trajectory_tum.h"
 
 namespace evpose {
@@ -43,9 +44,9 @@ bool parse(const char*& at, const char* end, double* value) {
 }
 
 Expected<StartState> from_text(const std::string& text_in, const Recording& recording) {
-  const Error wrong{
-      "--init", "'" + text_in + "' is no start pose",
-      "give groundtruth, anywhere, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s] with a unit quaternion"};
+  const Error wrong{"--init", "'" + text_in + "' is no start pose",
+                    "give groundtruth, anywhere, gps:LAT,LON,ALT, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s] "
+                    "with a unit quaternion"};
   const char* at = text_in.data();
   const char* const end = at + text_in.size();
   double v[7];
@@ -66,6 +67,39 @@ Expected<StartState> from_text(const std::string& text_in, const Recording& reco
   return start;
 }
 
+/// Three or four numbers with commas between.
+std::optional<std::vector<double>> gps_numbers(const std::string& words) {
+  const char* at = words.data();
+  const char* const end = at + words.size();
+  std::vector<double> out;
+  do {
+    double number = 0;
+    if (!parse(at, end, &number)) return {};
+    out.push_back(number);
+  } while (at != end && *at++ == ',');
+  if (at != end || out.size() < 3 || out.size() > 4) return {};
+  return out;
+}
+
+/// LAT,LON,ALT[,SIGMA]; the sigma, if it is given, replaces `sigma_m`.
+Expected<Pose> from_gps(const std::string& words, const Recording& recording, const MapPlacement& placement,
+                        double& sigma_m) {
+  const auto numbers = gps_numbers(words);
+  if (!numbers || std::abs((*numbers)[0]) > 90 || std::abs((*numbers)[1]) > 180 ||
+      (numbers->size() == 4 && (*numbers)[3] <= 0))
+    return Error{"--init", "'gps:" + words + "' is no place on earth",
+                 "give gps:LAT,LON,ALT[,SIGMA] in degrees, m above the ellipsoid, and m"};
+  if (!placement.origin_llh)
+    return Error{"--init gps", "the map is not placed on the earth",
+                 "place it: `evpose map import MAP --heading DEG --origin LAT,LON,ALT -o PLACED.h5`"};
+  if (numbers->size() == 4) sigma_m = (*numbers)[3];
+  const Pose T_ned_map = recording.T_ned_map   ? Pose::from_matrix(*recording.T_ned_map)
+                         : placement.T_ned_map ? *placement.T_ned_map
+                                               : Pose{Eigen::Quaterniond(rotation_ned_enu()), {0, 0, 0}};
+  const Eigen::Vector3d llh((*numbers)[0], (*numbers)[1], (*numbers)[2]);
+  return Pose{Eigen::Quaterniond::Identity(), T_ned_map.inverse() * ned_from_llh(llh, *placement.origin_llh)};
+}
+
 void widen(double position_m, double rotation_rad, FusionConfig* config) {
   config->start_position_sigma_m = std::max(config->start_position_sigma_m, position_m);
   config->start_rotation_sigma_rad = std::max(config->start_rotation_sigma_rad, rotation_rad);
@@ -78,7 +112,7 @@ void widen(double position_m, double rotation_rad, FusionConfig* config) {
 
 Expected<StartState> choose_start(const std::string& init, const Recording& recording,
                                   const std::vector<TimedPose>& truth, const StartSigma& sigma,
-                                  FusionConfig* config) {
+                                  const MapPlacement& placement, FusionConfig* config) {
   if (init == "groundtruth" || (init == "auto" && !truth.empty())) {
     if (truth.empty())
       return Error{"--init groundtruth", "the recording has no ground truth",
@@ -95,20 +129,27 @@ Expected<StartState> choose_start(const std::string& init, const Recording& reco
     start.T_map_body = recording.initial_pose->T_map_body;
     return start;
   }
-  if (starts_anywhere(init)) {
+  if (starts_anywhere(init) || starts_by_gps(init)) {
     if (!recording.has_imu)
-      return Error{"--init anywhere", "the recording has no IMU, which tells what is up",
+      return Error{"--init " + init, "the recording has no IMU, which tells what is up",
                    "give --init x,y,z,qx,qy,qz,qw[@t_s] or a TUM file"};
-    widen(kAnywhereSigma_m, kAnywhereSigma_deg * M_PI / 180, config);
     StartState start;
     start.t = recording.first_ns;
+    double sigma_m = kAnywhereSigma_m;
+    if (starts_by_gps(init)) {
+      sigma_m = kGpsSigma_m;
+      const auto place = from_gps(init.substr(std::string("gps:").size()), recording, placement, sigma_m);
+      if (!place) return place.error();
+      start.T_map_body = *place;
+    }
+    widen(sigma_m, kAnyHeading_deg * M_PI / 180, config);
     return start;
   }
   if (init.find(',') == std::string::npos) {
     const auto poses = read_tum(init);
     if (!poses)
       return Error{"--init", poses.error().line(),
-                   "give groundtruth, anywhere, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
+                   "give groundtruth, anywhere, gps:LAT,LON,ALT, a TUM file, or x,y,z,qx,qy,qz,qw[@t_s]"};
     return from_trajectory(*poses, recording, init);
   }
   auto start = from_text(init, recording);
@@ -124,6 +165,7 @@ std::string start_words(const std::string& init, bool has_truth) {
   if (init == "groundtruth" || (init == "auto" && has_truth)) return "started from ground truth";
   if (init == "auto") return "started from the recording's initial_pose";
   if (starts_anywhere(init)) return "started anywhere in the map";
+  if (starts_by_gps(init)) return "started from a place by GPS";
   return init.find(',') == std::string::npos ? "started from " + init : "started from --init";
 }
 

@@ -187,8 +187,12 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
   job.config = config;
   if (auto status = choose_frame_use(recording, job.config.tracker.frames.use); !status)
     return status.error();
+  const auto path = map_path(request, recording);
+  if (!path) return path.error();
+  const auto placement = read_map_placement(*path);
+  if (!placement) return placement.error();
   auto start = choose_start(request.init, recording, truth, {request.init_sigma[0], request.init_sigma[1]},
-                            &job.config.tracker.fusion);
+                            *placement, &job.config.tracker.fusion);
   if (!start) return start.error();
   const auto map = open_map_of(request, job.config, recording, start->T_map_body.p);
   if (!map) return map.error();
@@ -237,7 +241,7 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   }
   auto job = make_job(request, config, *recording, std::move(truth));
   if (!job) return job;
-  if (starts_anywhere(request.init) && !imu.empty())
+  if ((starts_anywhere(request.init) || starts_by_gps(request.init)) && !imu.empty())
     job->start.T_map_body.q = Eigen::Quaterniond::FromTwoVectors(imu.front().accel, Eigen::Vector3d::UnitZ());
   for (const Error& doubt : doubt_imu(imu, job->truth, job->start, recording->imu_path))
     job->findings.push_back(doubt);

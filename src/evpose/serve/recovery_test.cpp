@@ -150,7 +150,9 @@ TEST(EvenShare, OfMoreTakesAsManyAsAreWantedFromAllOfThePacket) {
   for (int i = 0; i < 1000; ++i) {
     const EventPacket out = share.of(packet_of(i * kNsPerMs, 100'000));
     taken += out.events.size();
-    if (i > 100) EXPECT_GT(out.events.size(), 4000u) << "none goes without";
+    if (i > 100) {
+      EXPECT_GT(out.events.size(), 4000u) << "none goes without";
+    }
   }
   EXPECT_NEAR(static_cast<double>(taken), 6e6, 0.05e6);
 }

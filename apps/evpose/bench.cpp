@@ -10,6 +10,7 @@
 #include "evpose/bench/experiments/corner_repeatability.h"
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
+#include "evpose/bench/experiments/kidnapping.h"
 #include "evpose/bench/experiments/published.h"
 #include "evpose/bench/experiments/realtime.h"
 #include "evpose/bench/experiments/relocalization.h"
@@ -117,6 +118,23 @@ void add_relocalization(CLI::App& bench, Run& run) {
   command->add_flag("!--no-imu", request->imu, "leave the IMU out");
   command->callback(
       [=, &run] { run = [=] { return exit_status(experiments::print_relocalization(*request)); }; });
+}
+
+void add_kidnapping(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("kidnap", "Live sessions whose data stop while the camera moves on");
+  auto request = std::make_shared<experiments::KidnappingRequest>();
+  add_selection(*command, request->selection);
+  command->add_option("--seeds", request->seeds, "places of each recording")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--cut-s", request->cut_s, "data that are left out")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  command->add_option("--threads", request->threads, "places at a time")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_kidnapping(*request)); }; });
 }
 
 void add_event_origins(CLI::App& bench, Run& run) {
@@ -252,6 +270,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_calibration(*bench, run);
   add_calibration_errors(*bench, run);
   add_relocalization(*bench, run);
+  add_kidnapping(*bench, run);
   add_corners(*bench, run);
   add_event_origins(*bench, run);
   add_faults(*bench, run);

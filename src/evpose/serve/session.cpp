@@ -16,7 +16,7 @@ constexpr TimeNs kOffsetWindow = 10 * kNsPerS;  // the shortest way of this time
 
 // Of a pose that is some time old. By then it may have moved on, at any speed.
 constexpr double kAgainPosition_m = 0.03, kAgainRotation_rad = 0.02, kAgainSpeed_m_s = 0.5;
-constexpr double kMovedOn_m_s = 1, kMostMovedOn_m = 5;
+constexpr double kMovedOn_m_s = 1, kMostMovedOn_m = 5, kTurnedOn_rad_s = 0.5;
 
 // Searches for a pose, one after the other: around where it should be, as by GPS and compass, anywhere. The
 // first two for so long, of data.
@@ -209,7 +209,7 @@ bool Session::create(TrackerStart start) {
 TrackerStart Session::moved_on(TrackerStart start) const {
   const double gap_s = std::max(0.0, to_seconds(start.state.t - next_.state.t));
   start.position_sigma_m = config_.search.position_sigma_m + std::min(kMostMovedOn_m, kMovedOn_m_s * gap_s);
-  start.rotation_sigma_rad = config_.search.rotation_sigma_rad;
+  start.rotation_sigma_rad = config_.search.rotation_sigma_rad + std::min(M_PI, kTurnedOn_rad_s * gap_s);
   return start;
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <random>
 
 #include "evpose/bench/experiments/streams.h"
@@ -15,6 +14,7 @@ namespace evpose::experiments {
 namespace {
 
 constexpr double kBefore_s = 0.4, kAfter_s = 1, kBack_m = 0.01;
+constexpr double kSpare_s = 0.1;  // at the recording's ends
 
 struct Outcome {
   double back_after_s = -1;  ///< to stay, of the data that came again
@@ -45,7 +45,7 @@ Outcome kidnap(const Streams& streams, double cut_s, unsigned seed) {
   const std::vector<TimedPose>& truth = streams.job.truth;
   const double share = (static_cast<double>(random()) + 0.5) / 4294967296.0;
   const TimeNs first = truth.front().t + 10 * kNsPerMs;
-  const double slack_s = to_seconds(truth.back().t - first) - kBefore_s - cut_s - kAfter_s - 0.05;
+  const double slack_s = to_seconds(truth.back().t - first) - kBefore_s - cut_s - kAfter_s - 0.5 * kSpare_s;
   const TimeNs begin = first + from_seconds(share * std::max(1e-3, slack_s));
   const TimeNs gone = begin + from_seconds(kBefore_s), again = gone + from_seconds(cut_s);
   const TimeNs end = again + from_seconds(kAfter_s);
@@ -113,7 +113,11 @@ Status print_kidnapping(const KidnappingRequest& request) {
   for (const BenchRecording& recording : *recordings) {
     const auto streams = load_streams(recording, *config);
     if (!streams) return streams.error();
-    if (streams->imu.empty()) return Error{recording.name, "has no IMU", "name recordings with --only"};
+    const std::vector<TimedPose>& truth = streams->job.truth;
+    const double needed_s = kBefore_s + request.cut_s + kAfter_s + kSpare_s;
+    if (streams->imu.empty() || to_seconds(truth.back().t - truth.front().t) < needed_s)
+      return Error{recording.name, text("has no IMU or lasts less than ", needed_s, " s"),
+                   "name recordings with --only, or cut less"};
     std::vector<Outcome> outcomes(static_cast<std::size_t>(request.seeds));
     ThreadPool pool(request.threads);
     pool.for_chunks(outcomes.size(), 1, [&](std::size_t, std::size_t i, std::size_t) {

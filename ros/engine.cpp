@@ -57,6 +57,7 @@ Expected<Setup> read_setup(const Parameters& parameters) {
                  {},
                  nullptr,
                  chosen->intrinsics};
+  out.tracker.places = std::make_shared<PlaceCache>();
   if (calibration->imu_noise) out.tracker.imu_noise = *calibration->imu_noise;
   if (!parameters.imu_model.empty()) {
     const auto noise = read_imu_noise(parameters.imu_model);

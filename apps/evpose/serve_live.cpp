@@ -105,6 +105,11 @@ class TrackerMaker {
     auto first = out.make(out.first_start());
     if (!first) return first.error();
     out.first_ = std::move(*first);
+    if (!job.config.tracker.relocalization.on || !out.first_->needs_search()) return out;
+    // What its search needs of the map is kept.
+    TrackerStart searching = out.first_start();
+    searching.searches = true;
+    if (auto made = out.make(searching); !made) return made.error();
     return out;
   }
 
@@ -256,13 +261,14 @@ Expected<int> serve(const ServeRequest& request) {
   if (!config) return config.error();
   const std::string& address = request.track.recording;
   const bool live = is_live(address);
-  const auto job = live ? prepare_source(request, config->run) : prepare(request.track, config->run);
+  auto job = live ? prepare_source(request, config->run) : prepare(request.track, config->run);
   if (!job) return job.error();
   auto source = open_source(address, *job, config->replay);
   if (!source) return source.error();
   if (const double speed = config->replay.speed; !live && speed != 1)
     log_warning(speed > 0 ? text("not real time: the recording is replayed at ", speed, " times its speed")
                           : std::string("not real time: the recording is replayed as fast as it is tracked"));
+  job->setup.places = std::make_shared<PlaceCache>();
   auto maker = TrackerMaker::create(*job);
   if (!maker) return maker.error();
   const auto placement = read_map_placement(job->map->source);
@@ -271,13 +277,14 @@ Expected<int> serve(const ServeRequest& request) {
   Outputs outputs(*config, *job, *placement);
   if (auto ok = outputs.open(request, *config, *job); !ok) return ok.error();
 
-  Session session(session_config(*config, *job), job->recording.has_imu, maker->first_start(),
-                  live ? std::nullopt : std::optional(job->start.t),
-                  [&](const TrackerStart& start) { return maker->make(start); },
-                  {[&](const Update& u, TimeNs offset, Tracker& tracker) { outputs.add(u, offset, tracker); },
-                   [&](const std::string& why) { outputs.restarted(why); },
-                   [&](const std::string& what) { outputs.stalled(what); },
-                   [&](const std::string& words) { outputs.notice(words); }});
+  Session session(
+      session_config(*config, *job), job->recording.has_imu, maker->first_start(),
+      live ? std::nullopt : std::optional(job->start.t),
+      [&](const TrackerStart& start) { return maker->make(start); },
+      {[&](const Update& u, TimeNs offset, Tracker& tracker) { outputs.add(u, offset, tracker); },
+       [&](const std::string& why) { outputs.restarted(why); },
+       [&](const std::string& what) { outputs.stalled(what); },
+       [&](const std::string& words) { outputs.notice(words); }, [&] { return outputs.whereabouts(); }});
   StreamQueue queue(config->queue);
   const InterruptGuard guard;
   std::signal(SIGHUP, ask_reset);

@@ -2,6 +2,7 @@
 #include "serve_outputs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <numeric>
 
@@ -98,6 +99,13 @@ void Outputs::add(const Update& u, TimeNs data_to_monotonic, Tracker& tracker) {
 
 void Outputs::restarted(const std::string& why) {
   if (reporter_) reporter_->restarted(why);
+}
+
+std::optional<TrackerStart> Outputs::whereabouts() const {
+  const auto place = reporter_ ? reporter_->vehicle_place(monotonic_ns()) : std::nullopt;
+  if (!place) return {};
+  constexpr double kGps_m = 3, kCompass_rad = 0.35;
+  return TrackerStart{{0, place->T_map_body}, kGps_m, place->has_heading ? kCompass_rad : M_PI};
 }
 
 void Outputs::notice(const std::string& words) {

@@ -6,12 +6,14 @@
 #include <deque>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "evpose/io/maps/map_h5.h"
 #include "evpose/mavlink/link.h"
 #include "evpose/report/run_verdict.h"
+#include "evpose/serve/tracker_start.h"
 #include "evpose/view/viewer.h"
 #include "serve_live.h"
 
@@ -47,6 +49,8 @@ class Outputs {
   void add(const Update& u, TimeNs data_to_monotonic, Tracker& tracker);
   void restarted(const std::string& why);
   void notice(const std::string& words);
+  /// Where the autopilot's GPS and compass have the vehicle, if it said so just now.
+  std::optional<TrackerStart> whereabouts() const;
   void stalled(const std::string& what);
   /// Reads from the link and sends what is due.
   void service(TimeNs now_ns);

@@ -63,6 +63,17 @@ struct LocalPositionNed {
   static void fields(auto& m, auto&& f) { f(m.time_boot_ms, m.x, m.y, m.z, m.vx, m.vy, m.vz); }
 };
 
+struct GlobalPositionInt {
+  static constexpr MessageType kType{33, 104, 28, 28, "GLOBAL_POSITION_INT"};
+  std::uint32_t time_boot_ms = 0;
+  std::int32_t lat = 0, lon = 0, alt = 0, relative_alt = 0;
+  std::int16_t vx = 0, vy = 0, vz = 0;
+  std::uint16_t hdg = 65535;  ///< not known
+  static void fields(auto& m, auto&& f) {
+    f(m.time_boot_ms, m.lat, m.lon, m.alt, m.relative_alt, m.vx, m.vy, m.vz, m.hdg);
+  }
+};
+
 struct SetGpsGlobalOrigin {
   static constexpr MessageType kType{48, 41, 13, 21, "SET_GPS_GLOBAL_ORIGIN"};
   std::int32_t latitude = 0, longitude = 0, altitude = 0;
@@ -216,9 +227,10 @@ struct Odometry {
 /// Hands one default message of each type to `f`.
 void for_each_message(auto&& f) {
   f(Heartbeat{}), f(SystemTime{}), f(Attitude{}), f(AttitudeQuaternion{}), f(LocalPositionNed{}),
-      f(SetGpsGlobalOrigin{}), f(GpsGlobalOrigin{}), f(CommandLong{}), f(CommandAck{}),
-      f(VisionPositionEstimate{}), f(VisionSpeedEstimate{}), f(HighresImu{}), f(Timesync{}), f(AttPosMocap{}),
-      f(LandingTarget{}), f(EkfStatusReport{}), f(EstimatorStatus{}), f(Statustext{}), f(Odometry{});
+      f(GlobalPositionInt{}), f(SetGpsGlobalOrigin{}), f(GpsGlobalOrigin{}), f(CommandLong{}),
+      f(CommandAck{}), f(VisionPositionEstimate{}), f(VisionSpeedEstimate{}), f(HighresImu{}), f(Timesync{}),
+      f(AttPosMocap{}), f(LandingTarget{}), f(EkfStatusReport{}), f(EstimatorStatus{}), f(Statustext{}),
+      f(Odometry{});
 }
 
 }  // namespace evpose::mavlink

@@ -289,7 +289,29 @@ void Reporter::handle(const Frame& frame, TimeNs now_ns) {
     send(reply);
   } else if (const auto origin = decode<GpsGlobalOrigin>(frame)) {
     origin_confirmed_ = true;
+  } else if (const auto place = decode<GlobalPositionInt>(frame)) {
+    if (config_.origin_latitude_deg == 0 && config_.origin_longitude_deg == 0) return;
+    place_ = place_of(*place);
+    place_heard_ = now_ns;
   }
+}
+
+Reporter::VehiclePlace Reporter::place_of(const GlobalPositionInt& m) const {
+  const Eigen::Vector3d llh(1e-7 * m.lat, 1e-7 * m.lon, 1e-3 * m.alt);
+  const Eigen::Vector3d origin(config_.origin_latitude_deg, config_.origin_longitude_deg,
+                               config_.origin_altitude_m);
+  constexpr std::uint16_t kNoHeading = 65535;
+  VehiclePlace out;
+  out.has_heading = m.hdg != kNoHeading;
+  const double heading_rad = out.has_heading ? 0.01 * m.hdg * M_PI / 180 : 0;
+  // Forward-left-up of a level vehicle with this heading.
+  const Pose T_ned_vehicle{so3::exp({0, 0, heading_rad}) * so3::exp({M_PI, 0, 0}), ned_from_llh(llh, origin)};
+  out.T_map_body = frames_.T_ned_map.inverse() * T_ned_vehicle * frames_.T_body_vehicle.inverse();
+  return out;
+}
+
+std::optional<Reporter::VehiclePlace> Reporter::vehicle_place(TimeNs now_ns) const {
+  return place_ && now_ns - place_heard_ < kPlaceLasts ? place_ : std::nullopt;
 }
 
 }  // namespace mavlink

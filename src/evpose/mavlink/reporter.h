@@ -10,6 +10,7 @@
 #include "evpose/core/time.h"
 #include "evpose/mavlink/codec.h"
 #include "evpose/mavlink/frames.h"
+#include "evpose/mavlink/messages.h"
 
 namespace evpose {
 
@@ -65,6 +66,15 @@ class Reporter {
   /// Heartbeat, clock and origin: call at least ten times a second.
   void tick(TimeNs now_ns);
 
+  /// Level, where the autopilot's GPS and compass have the body, if it said so within kPlaceLasts and the
+  /// map's origin is known. Without a heading any is possible.
+  struct VehiclePlace {
+    Pose T_map_body;
+    bool has_heading = false;
+  };
+  std::optional<VehiclePlace> vehicle_place(TimeNs now_ns) const;
+  static constexpr TimeNs kPlaceLasts = 2 * kNsPerS;
+
   std::uint8_t reset_counter() const { return reset_counter_; }
   const ClockOffset& clock() const { return clock_; }
   std::optional<std::uint8_t> vehicle() const { return vehicle_; }
@@ -80,6 +90,7 @@ class Reporter {
   void send_failed();
   void send_landing_target(const NedState& state, std::uint64_t time_usec);
   void handle(const Frame& frame, TimeNs now_ns);
+  VehiclePlace place_of(const GlobalPositionInt& m) const;
   std::uint64_t stamp_usec(TimeNs monotonic) const;
 
   MavlinkConfig config_;
@@ -88,6 +99,8 @@ class Reporter {
   Parser parser_;
   ClockOffset clock_;
   std::optional<std::uint8_t> vehicle_;
+  std::optional<VehiclePlace> place_;
+  TimeNs place_heard_ = 0;
   std::optional<Update> last_;  ///< valid one
   Eigen::Quaterniond last_q_ = Eigen::Quaterniond::Identity();
   TimeNs next_pose_ = std::numeric_limits<TimeNs>::min(), next_target_ = next_pose_;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,67 @@ TEST(MavlinkReporter, LongWordsComeInChunksThatJoinToTheWhole) {
     }
     EXPECT_EQ(joined, whole);
   }
+}
+
+class VehiclePlaceLaws : public testing::Test {
+ protected:
+  VehiclePlaceLaws() {
+    config_.origin_latitude_deg = 47.5;
+    config_.origin_longitude_deg = 8.5;
+    config_.origin_altitude_m = 400;
+    message_.lat = 475001000;
+    message_.lon = 85000000;
+    message_.alt = 412000;
+  }
+  std::optional<Reporter::VehiclePlace> heard(TimeNs later = kNsPerS) const {
+    Reporter reporter(config_, frames_, [](Bytes) {});
+    reporter.receive(encode(message_, 0, 1, 1).bytes(), kNsPerS);
+    return reporter.vehicle_place(kNsPerS + later);
+  }
+
+  MavlinkConfig config_;
+  VehicleFrames frames_{{Eigen::Quaterniond(rotation_ned_enu()), {0, 0, 0}}, {}};
+  GlobalPositionInt message_;
+};
+
+TEST_F(VehiclePlaceLaws, IsEastNorthAndUpOfTheOrigin) {
+  const auto place = heard();
+  ASSERT_TRUE(place);
+  EXPECT_FALSE(place->has_heading);
+  EXPECT_NEAR(place->T_map_body.p.x(), 0, 1e-3);
+  EXPECT_NEAR(place->T_map_body.p.y(), 11.12, 0.01) << "a ten-thousandth of a degree";
+  EXPECT_NEAR(place->T_map_body.p.z(), 12, 1e-3);
+}
+
+TEST_F(VehiclePlaceLaws, TheVehiclesForwardAxisHasTheHeading) {
+  for (const double heading_deg : {0.0, 90.0, 200.0}) {
+    message_.hdg = static_cast<std::uint16_t>(100 * heading_deg);
+    const auto place = heard();
+    ASSERT_TRUE(place && place->has_heading);
+    const double a = heading_deg * M_PI / 180;
+    const Eigen::Vector3d forward = place->T_map_body.q * Eigen::Vector3d::UnitX();
+    EXPECT_LT((forward - Eigen::Vector3d(std::sin(a), std::cos(a), 0)).norm(), 1e-9) << "x east, y north";
+    EXPECT_LT((place->T_map_body.q * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+  }
+}
+
+TEST_F(VehiclePlaceLaws, IsWhatTheSentPoseSays) {
+  frames_ = {{so3::exp({M_PI, 0.02, 0.7}), {3, 4, 5}}, {so3::exp({0.1, 0.2, 0.3}), {0.2, -0.1, 0.05}}};
+  message_.hdg = 12345;
+  const auto place = heard();
+  ASSERT_TRUE(place);
+  Update u;
+  u.T_map_body = place->T_map_body;
+  const NedState ned = to_ned(u, frames_);
+  EXPECT_LT((ned.position - ned_from_llh({47.5001, 8.5, 412}, {47.5, 8.5, 400})).norm(), 1e-7);
+  EXPECT_NEAR(euler_of(ned.q_ned_frd).z(), 123.45 * M_PI / 180, 1e-9);
+  EXPECT_NEAR(euler_of(ned.q_ned_frd).head<2>().norm(), 0, 1e-9);
+}
+
+TEST_F(VehiclePlaceLaws, IsForgottenAndNeedsAnOrigin) {
+  EXPECT_FALSE(heard(3 * kNsPerS));
+  config_.origin_latitude_deg = config_.origin_longitude_deg = 0;
+  EXPECT_FALSE(heard());
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/map/depth_buffer.h"
+
 namespace evpose {
 namespace {
 
@@ -70,23 +72,50 @@ Eigen::AlignedBox3d space_around(const ContourMap& map) {
   return box;
 }
 
+/// Fills an index, place by place.
+class PlaceIndexBuilder {
+ public:
+  PlaceIndexBuilder(const ContourIndex& index, const VisibleSetConfig& config, PlaceIndex& out)
+      : index_(index),
+        config_(config),
+        out_(out),
+        depth_(make_depth(std::make_index_sequence<6>())),
+        occlusion_(config.occlusion && !index.occluders().empty()),
+        sample_of_(index.map().points.size(), kNone) {}
+
+  void add_place(const Eigen::Vector3d& middle);
+
+ private:
+  void draw_surfaces(const Eigen::Vector3d& middle);
+  bool hidden(const Eigen::Vector3d& from_middle) const;
+
+  const ContourIndex& index_;
+  const VisibleSetConfig& config_;
+  PlaceIndex& out_;
+  std::array<DepthBuffer, 6> depth_;  ///< to the sides of a cube
+  bool occlusion_;
+  std::vector<std::uint32_t> cubes_;
+  std::array<std::vector<std::uint32_t>, PlaceIndex::kDirections> of_direction_;  ///< of the place being made
+  std::vector<std::uint32_t> sample_of_;  ///< of the map's points, kNone: not used
+};
+
+double PlaceIndex::edge_m_of(const Eigen::AlignedBox3d& box) {
+  return std::max(kLeastEdge_m, std::cbrt(box.volume() / kMostPlaces));
+}
+
 PlaceIndex::PlaceIndex(const ContourIndex& index, const VisibleSetConfig& config,
                        const Eigen::AlignedBox3d& box)
-    : index_(index),
-      config_(config),
-      edge_m_(std::max(kLeastEdge_m, std::cbrt(box.volume() / kMostPlaces))),
-      depth_(make_depth(std::make_index_sequence<6>())),
-      occlusion_(config.occlusion && !index.occluders().empty()) {
+    : edge_m_(edge_m_of(box)), anchor_(index.map().anchor) {
   if (box.isEmpty()) return;
-  sample_of_.assign(index.map().points.size(), kNone);
+  PlaceIndexBuilder builder(index, config, *this);
   const Eigen::Vector3i counts = (box.sizes() / edge_m_).array().ceil().max(1).cast<int>();
   const Eigen::Vector3d first = box.center() - 0.5 * edge_m_ * (counts.array() - 1).matrix().cast<double>();
   for (int x = 0; x < counts.x(); ++x)
     for (int y = 0; y < counts.y(); ++y)
-      for (int z = 0; z < counts.z(); ++z) add_place(first + edge_m_ * Eigen::Vector3d(x, y, z));
+      for (int z = 0; z < counts.z(); ++z) builder.add_place(first + edge_m_ * Eigen::Vector3d(x, y, z));
 }
 
-void PlaceIndex::draw_surfaces(const Eigen::Vector3d& middle) {
+void PlaceIndexBuilder::draw_surfaces(const Eigen::Vector3d& middle) {
   const ContourMap& map = index_.map();
   for (int s = 0; s < 6; ++s) {
     const Eigen::Matrix3d R = side(s);
@@ -101,12 +130,12 @@ void PlaceIndex::draw_surfaces(const Eigen::Vector3d& middle) {
   }
 }
 
-bool PlaceIndex::hidden(const Eigen::Vector3d& from_middle) const {
+bool PlaceIndexBuilder::hidden(const Eigen::Vector3d& from_middle) const {
   const int s = side_of(from_middle);
   return depth_[static_cast<std::size_t>(s)].hides(side(s).transpose() * from_middle);
 }
 
-void PlaceIndex::add_place(const Eigen::Vector3d& middle) {
+void PlaceIndexBuilder::add_place(const Eigen::Vector3d& middle) {
   const ContourMap& map = index_.map();
   if (occlusion_) draw_surfaces(middle);
   for (auto& seen : of_direction_) seen.clear();
@@ -134,21 +163,21 @@ void PlaceIndex::add_place(const Eigen::Vector3d& middle) {
       if (occlusion_ && hidden(ray)) continue;
       std::uint32_t& sample = sample_of_[number];
       if (sample == kNone) {
-        sample = static_cast<std::uint32_t>(samples_.size());
-        samples_.push_back({map.points[number].position, map.points[number].tangent});
+        sample = static_cast<std::uint32_t>(out_.samples_.size());
+        out_.samples_.push_back({map.points[number].position, map.points[number].tangent});
       }
       of_direction_[static_cast<std::size_t>(direction_of(ray))].push_back(sample);
       ++count;
     }
   }
   if (count < kFewestPoints) return;
-  Place place{middle, {}};
-  for (std::size_t k = 0; k < kDirections; ++k) {
-    place.begins[k] = static_cast<std::uint32_t>(points_.size());
-    points_.insert(points_.end(), of_direction_[k].begin(), of_direction_[k].end());
+  PlaceIndex::Place place{middle, {}};
+  for (std::size_t k = 0; k < PlaceIndex::kDirections; ++k) {
+    place.begins[k] = static_cast<std::uint32_t>(out_.points_.size());
+    out_.points_.insert(out_.points_.end(), of_direction_[k].begin(), of_direction_[k].end());
   }
-  place.begins[kDirections] = static_cast<std::uint32_t>(points_.size());
-  places_.push_back(place);
+  place.begins[PlaceIndex::kDirections] = static_cast<std::uint32_t>(out_.points_.size());
+  out_.places_.push_back(place);
 }
 
 std::vector<int> PlaceIndex::directions_around(const Eigen::Vector3d& axis, double angle_rad) {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "evpose/map/contour_index.h"
-#include "evpose/map/depth_buffer.h"
 #include "evpose/map/visible_set.h"
 
 namespace evpose {
@@ -24,8 +23,10 @@ class PlaceIndex {
     std::array<std::uint32_t, kDirections + 1> begins;  ///< of the directions' ranges
   };
 
-  /// Places over a box of the map frame. `index` and its map outlive it.
+  /// Places over a box of the map frame.
   PlaceIndex(const ContourIndex& index, const VisibleSetConfig& config, const Eigen::AlignedBox3d& box);
+  /// Edge of a place, of an index over such a box.
+  static double edge_m_of(const Eigen::AlignedBox3d& box);
 
   std::span<const Place> places() const { return places_; }
   /// A point of a contour.
@@ -41,25 +42,17 @@ class PlaceIndex {
   /// Directions with rays within this angle of an axis of the map frame.
   static std::vector<int> directions_around(const Eigen::Vector3d& axis, double angle_rad);
   const Sample& sample(std::uint32_t number) const { return samples_[number]; }
-  const Eigen::Vector3d& anchor() const { return index_.map().anchor; }
-  double edge_m() const { return edge_m_; }  ///< of a place
+  const Eigen::Vector3d& anchor() const { return anchor_; }  ///< of the map
+  double edge_m() const { return edge_m_; }                  ///< of a place
 
  private:
-  void add_place(const Eigen::Vector3d& middle);
-  void draw_surfaces(const Eigen::Vector3d& middle);
-  bool hidden(const Eigen::Vector3d& from_middle) const;
+  friend class PlaceIndexBuilder;
 
-  const ContourIndex& index_;
-  VisibleSetConfig config_;
   double edge_m_;
-  std::array<DepthBuffer, 6> depth_;  ///< to the sides of a cube
-  bool occlusion_;
-  std::vector<std::uint32_t> cubes_;
+  Eigen::Vector3d anchor_;
   std::vector<Place> places_;
   std::vector<std::uint32_t> points_;
-  std::array<std::vector<std::uint32_t>, kDirections> of_direction_;  ///< of the place that is being made
   std::vector<Sample> samples_;
-  std::vector<std::uint32_t> sample_of_;  ///< of the map's points, kNone: not used
 };
 
 /// Around all contours of a map that are aligned to, with room for a camera beside them.

@@ -13,7 +13,9 @@ constexpr std::size_t kAttitudes = 16;
 constexpr std::size_t kPlaces = 400;  // of all attitudes together
 constexpr std::size_t kRefined = 48;  // of the different ones among these
 constexpr std::size_t kKept = 16;
-constexpr double kSigmas = 2.5;                              // of the prior that are searched
+constexpr double kSigmas = 2.5;          // of the prior that are searched
+constexpr double kPlaceKnown_m = 30;     // with a larger sigma the prior's place tells nothing
+constexpr double kBeforeContours_m = 1;  // around the prior's place, outside of the contours' box
 constexpr double kDifferent_m = 0.15, kDifferent_rad = 0.1;  // before refinement
 constexpr double kSame_m = 0.03, kSame_rad = 0.015;          // after it
 constexpr double kAttitudeSigma_rad = 0.02;                  // of an attitude by lines
@@ -55,19 +57,28 @@ bool WideSearch::suits(const Matrix6d& covariance, const Camera& camera) {
          kAbove_px;
 }
 
-WideSearch::WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible)
+WideSearch::WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible,
+                       PlaceCache& places)
     : index_(index),
       camera_(camera),
       visible_config_(visible),
       space_(space_around(index.map())),
       directions_(main_directions(index.map())),
       line_finder_(camera.size()),
-      visible_(index, camera, points_to_refine(visible)) {}
+      visible_(index, camera, points_to_refine(visible)),
+      cache_(places) {}
 
-/// Where the camera may be.
+/// Where the camera may be: among the contours, or before them if the prior has it there.
 Eigen::AlignedBox3d WideSearch::box(const WidePrior& prior) const {
-  const Eigen::Vector3d reach = kSigmas * prior.covariance.diagonal().head<3>().cwiseSqrt();
-  return space_.intersection(Eigen::AlignedBox3d(prior.T_map_body.p - reach, prior.T_map_body.p + reach));
+  const Eigen::Vector3d sigma = prior.covariance.diagonal().head<3>().cwiseSqrt();
+  const Eigen::Vector3d& p = prior.T_map_body.p;
+  Eigen::AlignedBox3d space = space_;
+  if (sigma.maxCoeff() < kPlaceKnown_m) {
+    const Eigen::Vector3d near = sigma.cwiseMin(kBeforeContours_m);
+    space.extend(p - near);
+    space.extend(p + near);
+  }
+  return space.intersection(Eigen::AlignedBox3d(p - kSigmas * sigma, p + kSigmas * sigma));
 }
 
 void WideSearch::prepare(const WidePrior& prior) {
@@ -76,8 +87,10 @@ void WideSearch::prepare(const WidePrior& prior) {
   // The prior widens with time.
   const Eigen::Vector3d beside =
       kBesideSigmas * prior.covariance.diagonal().head<3>().cwiseSqrt().array() + kBeside_m;
-  places_box_ = space_.intersection(Eigen::AlignedBox3d(wanted.min() - beside, wanted.max() + beside));
-  places_ = std::make_unique<PlaceIndex>(index_, visible_config_, places_box_);
+  Eigen::AlignedBox3d space = space_;
+  space.extend(wanted);
+  places_box_ = space.intersection(Eigen::AlignedBox3d(wanted.min() - beside, wanted.max() + beside));
+  places_ = cache_.over(index_, visible_config_, places_box_);
 }
 
 PoseGuess WideSearch::refine(const EdgeField& field, const Pose& T_body_cam, const PoseGuess& guess,

@@ -12,7 +12,7 @@
 #include "evpose/registration/pose_search.h"
 #include "evpose/relocalization/attitude_search.h"
 #include "evpose/relocalization/edge_lines.h"
-#include "evpose/relocalization/place_index.h"
+#include "evpose/relocalization/place_cache.h"
 
 namespace evpose {
 
@@ -32,9 +32,10 @@ class WideSearch {
   static bool suits(const Matrix6d& covariance, const Camera& camera);
 
   /// The references outlive it.
-  WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible);
+  WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible,
+             PlaceCache& places);
 
-  /// Makes what depends on the map and the prior's place alone: seconds, once.
+  /// Makes what depends on the map and the prior's place alone, unless the cache has it: seconds.
   void prepare(const WidePrior& prior);
   /// Poses that differ, best first, at most sixteen. `events`: of some 10 to 30 ms, without rotation; `field`
   /// is of the same.
@@ -53,7 +54,8 @@ class WideSearch {
   std::vector<MapDirection> directions_;
   EdgeLineFinder line_finder_;
   VisibleSet visible_;
-  std::unique_ptr<PlaceIndex> places_;
+  PlaceCache& cache_;
+  std::shared_ptr<const PlaceIndex> places_;
   Eigen::AlignedBox3d places_box_;
   std::vector<SearchPoint> points_;
 };

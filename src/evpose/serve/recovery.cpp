@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "evpose/core/log.h"
 
@@ -47,6 +48,16 @@ void Recovery::give_up() {
   stopped_ = true;
   filled_.notify_all();
   emptied_.notify_all();
+}
+
+TimeNs Recovery::reached() const {
+  const std::lock_guard lock(mutex_);
+  return last_ ? last_->t : std::numeric_limits<TimeNs>::min() / 2;
+}
+
+bool Recovery::needs_search() const {
+  const std::lock_guard lock(mutex_);
+  return needs_search_;
 }
 
 bool Recovery::failed() const {
@@ -95,6 +106,7 @@ void Recovery::run(const Make& make) {
     tracker_->on_update([this](const Update& u) {
       const std::lock_guard inner(mutex_);
       last_ = u;
+      needs_search_ = tracker_->needs_search();
     });
     made_ = true;
   } else {

@@ -28,8 +28,9 @@ class EvenShare {
   double allowed_ = 0;  ///< events that may be taken now
 };
 
-/// Finds a lost pose while another tracker, or none, goes on: a tracker that searches runs on a thread of its
-/// own behind a queue of all that comes, falls behind while it searches, and catches up on what has waited.
+/// Finds a lost pose while another tracker, or none, goes on: a tracker that searches, or aligns its first
+/// view, runs on a thread of its own behind a queue of all that comes, falls behind meanwhile, and catches up
+/// on what has waited.
 /// The queue is bounded: of more events than kMost_mev_s an even share is taken.
 class Recovery {
  public:
@@ -49,6 +50,10 @@ class Recovery {
 
   /// The tracker once its pose is `tracking` and it has caught up; null before. Ends the search.
   std::unique_ptr<Tracker> take();
+  /// The data time that its tracker has come to; lowest before its first update.
+  TimeNs reached() const;
+  /// Its tracker does not search, and has to.
+  bool needs_search() const;
   /// It cannot be made, or too much waits.
   bool failed() const;
   /// Asks the thread to end, which it does when its tracker returns from what it does.
@@ -67,7 +72,7 @@ class Recovery {
   std::condition_variable filled_, emptied_;
   std::deque<Item> items_;
   std::size_t waiting_ = 0;  ///< events
-  bool made_ = false, failed_ = false, stopped_ = false, ended_ = false, busy_ = false;
+  bool made_ = false, failed_ = false, stopped_ = false, ended_ = false, busy_ = false, needs_search_ = false;
   EvenShare share_{kMost_mev_s};
   std::optional<Update> last_;        ///< of the tracker
   std::unique_ptr<Tracker> tracker_;  ///< the thread's until it has ended

@@ -148,13 +148,12 @@ TEST(EvenShare, OfMoreTakesAsManyAsAreWantedFromAllOfThePacket) {
   EvenShare share(6);
   std::size_t taken = 0;
   for (int i = 0; i < 1000; ++i) {
-    const EventPacket out = share.of(packet_of(i * kNsPerMs, 100'000));
+    const EventPacket out = share.of(packet_of(kNsPerS + i * kNsPerMs, 100'000));
+    if (i < 100) continue;  // a burst may come at first
     taken += out.events.size();
-    if (i > 100) {
-      EXPECT_GT(out.events.size(), 4000u) << "none goes without";
-    }
+    EXPECT_GT(out.events.size(), 4000u) << "none goes without";
   }
-  EXPECT_NEAR(static_cast<double>(taken), 6e6, 0.05e6);
+  EXPECT_NEAR(static_cast<double>(taken), 0.9 * 6e6, 0.01e6);
 }
 
 TEST_F(RecoveryLaws, WhatCannotBeMadeHasFailed) {
@@ -232,6 +231,15 @@ TEST_F(SessionSearches, AStartThatIsWrongBeyondItsSigmaIsFoundByItself) {
   EXPECT_EQ(restarts_, std::vector<std::string>{"the pose was found"});
   EXPECT_EQ(updates_.back().health, Health::tracking);
   EXPECT_LT(wrong_m(), 0.01);
+}
+
+TEST_F(SessionSearches, AWrongMapIsSearchedEverMoreWidelyAndNeverTracked) {
+  setup_.map = other_;
+  Session s = session({{time(0.1), pose_at(0.1), test_flight::velocity_at(0.1)}});
+  feed_session(s, 0.1, kFlight_s);
+  EXPECT_GE(s.counts().searches, 1u);
+  EXPECT_EQ(s.counts().found, 0u);
+  EXPECT_NE(updates_.back().health, Health::tracking);
 }
 
 TEST_F(SessionSearches, AfterDataWereAwayThePoseIsFoundWhereItHasMovedTo) {

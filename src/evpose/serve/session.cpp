@@ -193,12 +193,16 @@ bool Session::create(TrackerStart start) {
     refused_ = true;
     return false;
   }
-  if (again_ || !config_.search.on || !(*made)->needs_search()) use(std::move(*made));
-  if (config_.search.on && (again_ || !tracker_)) {
+  // What takes seconds of a core is done beside: a search, and the alignment of the first view.
+  const bool searches = again_ || (*made)->needs_search();
+  const bool slow = (*made)->aligns_start() || (searches && !again_);
+  if (!slow || !config_.search.on) use(std::move(*made));
+  if (config_.search.on && (slow || again_)) {
     // After a gap whichever is tracking first: this one, or one that is not where it was.
     if (again_) start = moved_on(start);
+    start.searches = searches;
     width_ = width_of(start);
-    search(start);
+    begin_beside(start);
   }
   for (const ImuSample& sample : before_) add_sample(sample);
   before_.clear();
@@ -239,19 +243,24 @@ TrackerStart Session::where_to_search() const {
   } else if (last_valid_) {
     out = {{0, last_valid_->T_map_body}};
   }
-  if (width_ >= kByGps) {
+  out.position_sigma_m = std::max(out.position_sigma_m, config_.search.position_sigma_m);
+  out.rotation_sigma_rad = std::max(out.rotation_sigma_rad, config_.search.rotation_sigma_rad);
+  if (const auto told = width_ == kByGps && hooks_.whereabouts ? hooks_.whereabouts() : std::nullopt) {
+    out = *told;
+  } else if (width_ >= kByGps) {
     out.position_sigma_m = width_ == kAnywhere ? kAnywhere_m : kGps_m;
     out.rotation_sigma_rad = width_ == kAnywhere ? kAnywhere_rad : kCompass_rad;
   }
+  out.searches = true;
   out.state.t = has_imu_ ? std::max(events_.last, imu_.last) : events_.last;
   return out;
 }
 
-void Session::search(TrackerStart from) {
-  from.searches = true;
+void Session::begin_beside(const TrackerStart& from) {
   searching_ = true;
   search_began_ = from.state.t;
-  ++counts_.searches;
+  counts_.searches += from.searches ? 1 : 0;
+  by_search_ = from.searches;
   recovery_ = std::make_unique<Recovery>([make = make_, from] { return make(from); }, config_.waits);
 }
 
@@ -259,7 +268,8 @@ void Session::search(TrackerStart from) {
 void Session::give_up_search() {
   if (!recovery_) return;
   recovery_->give_up();
-  given_up_.push_back(std::move(recovery_));
+  if (!config_.waits) given_up_.push_back(std::move(recovery_));
+  recovery_.reset();
 }
 
 void Session::end_search() {
@@ -275,20 +285,21 @@ void Session::mind_search() {
     count_tracker();
     use(std::move(found));
     end_search();
-    ++counts_.found;
-    hooks_.notice("the pose was found");
-    hooks_.restarted("the pose was found");
+    counts_.found += by_search_ ? 1 : 0;
+    if (by_search_) hooks_.notice("the pose was found");
+    if (counts_.updates > 0) hooks_.restarted("the pose was found");
   } else if (recovery_ && tracker_ && tracks_) {
     end_search();
   } else if (recovery_) {
     const bool long_enough =
-        width_ < kAnywhere && has_imu_ && events_.last - search_began_ > kLongest[width_];
-    if (!long_enough && !recovery_->failed()) return;
+        width_ < kAnywhere && has_imu_ && recovery_->reached() - search_began_ > kLongest[width_];
+    const bool astray = recovery_->needs_search();
+    if (!long_enough && !astray && !recovery_->failed()) return;
     give_up_search();
-    if (has_imu_) width_ = std::min(width_ + 1, kAnywhere);
+    if (has_imu_ && !astray) width_ = std::min(width_ + 1, kAnywhere);
   } else if (config_.search.on && (searching_ || (tracker_ && tracker_->needs_search())) &&
              given_up_.empty()) {
-    search(where_to_search());
+    begin_beside(where_to_search());
   }
 }
 

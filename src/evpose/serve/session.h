@@ -44,6 +44,8 @@ class Session {
     std::function<void(const std::string& why)> restarted;  ///< a new tracker stands somewhere else
     std::function<void(const std::string& what)> stalled;   ///< no pose until the next update
     std::function<void(const std::string& words)> notice;
+    /// Where others have it, within some metres, and its heading if the sigma says so.
+    std::function<std::optional<TrackerStart>()> whereabouts = {};
   };
 
   /// `start_at`: the data time of the start pose; unset: as soon as there are data.
@@ -90,7 +92,7 @@ class Session {
 
   TrackerStart moved_on(TrackerStart start) const;
   TrackerStart where_to_search() const;
-  void search(TrackerStart from);
+  void begin_beside(const TrackerStart& from);
   void give_up_search();
   void end_search();
   void mind_search();
@@ -109,6 +111,7 @@ class Session {
   bool searching_ = false;                           ///< a search goes on, or the next one is about to begin
   std::unique_ptr<Recovery> recovery_;               ///< the search, if one goes on
   std::vector<std::unique_ptr<Recovery>> given_up_;  ///< until their threads have ended
+  bool by_search_ = false;                           ///< it searches, and does not just align the first view
   TimeNs search_began_ = 0;                          ///< data time
   int width_ = 0;                                    ///< of the search
   Stream events_{"events"}, imu_{"IMU"};

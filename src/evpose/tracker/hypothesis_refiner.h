@@ -12,6 +12,7 @@
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/contour_view.h"
 #include "evpose/registration/event_registration.h"
+#include "evpose/relocalization/place_cache.h"
 #include "evpose/tracker/event_intervals.h"
 #include "evpose/tracker/pose_hypothesis.h"
 
@@ -26,6 +27,7 @@ struct RelocalizerScene {
   Eigen::Vector3d gravity_map;           ///< zero when there is no IMU
   VisibleSetConfig visible;              ///< the search has its own number and spacing of points
   EventRegistrationConfig registration;  ///< the search has its own gates and leaves polarity out
+  PlaceCache* places = nullptr;          ///< null: searches over metres keep their own
 };
 
 /// Refines pose and velocity of a hypothesis together: the single events of the last 40 ms at their own

@@ -47,7 +47,7 @@ class PoseSupervisor {
   /// The pose has to be searched, and is not: the start is too unsure, or the pose has been lost or refuted
   /// for long.
   bool needs_search() const {
-    return !searching() && ((start_is_unsure_ && !verified_) || is_astray_for_long());
+    return !config_.on && !searching() && ((start_is_unsure_ && !verified_) || is_astray_for_long());
   }
   /// From now on a pose that gets lost is left to needs_search().
   void search_no_more() { config_.on = false; }

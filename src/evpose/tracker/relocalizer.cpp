@@ -77,7 +77,9 @@ void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& 
   searches_ = 0;
   workspace_->widely = motion_.has_imu() && WideSearch::suits(covariance, scene_.camera);
   if (!workspace_->widely) return;
-  if (!workspace_->wide) workspace_->wide.emplace(scene_.index, scene_.camera, scene_.visible);
+  if (!workspace_->wide)
+    workspace_->wide.emplace(scene_.index, scene_.camera, scene_.visible,
+                             scene_.places != nullptr ? *scene_.places : workspace_->places);
   workspace_->wide->prepare(wide_prior());
 }
 

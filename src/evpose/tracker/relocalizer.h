@@ -82,6 +82,7 @@ class Relocalizer {
     explicit Workspace(const RelocalizerScene& scene, const HypothesisMotion& motion);
     EdgeField field;
     VisibleSet visible;              ///< points for the edges
+    PlaceCache places;               ///< where the scene has none
     std::optional<WideSearch> wide;  ///< once a prior has asked for it
     bool widely = false;             ///< this search is one by `wide`
     HypothesisRefiner refiner;

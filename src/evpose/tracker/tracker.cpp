@@ -85,7 +85,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       fusion_(std::move(fusion)),
       supervisor_(relocalization_config(config), config.health,
                   Relocalizer({map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
-                               config.visible, config.event_registration}),
+                               config.visible, config.event_registration, setup_.places.get()}),
                   PoseVerifier(setup_.camera->size(), map_.segments.count,
                                config.visible.occlusion && !map_.index.occluders().empty()),
                   states_errors(*setup_.map)),

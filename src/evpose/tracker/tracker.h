@@ -45,6 +45,8 @@ struct TrackerSetup {
   MapParts map_parts = {};
   Eigen::Vector3d map_middle = Eigen::Vector3d::Zero();
   FrameCamera frame_camera = {};  ///< of frames, if there are any
+  /// What searches over metres make of the map, shared with other trackers; null: its own.
+  std::shared_ptr<PlaceCache> places = {};
 };
 
 /// Out to where a part of a map has to reach around the camera.
@@ -99,6 +101,9 @@ class Tracker {
 
   /// The pose is being searched, and nothing measured meanwhile.
   bool searching() const { return supervisor_.searching(); }
+  /// The first view of a camera whose calibration is uncertain is to be aligned, each try of which takes a
+  /// fifth of a second of a core.
+  bool aligns_start() const { return start_alignment_.has_value(); }
   /// It has to be searched, and is not: relocalization.on is off, or search_no_more() was called.
   bool needs_search() const { return supervisor_.needs_search(); }
   void search_no_more() { supervisor_.search_no_more(); }

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+
+#include "evpose/relocalization/place_index.h"
+
+namespace evpose {
+
+/// The last place indices that searches asked for: one takes seconds of a core. May be shared by threads; one
+/// that asks while another makes an index waits.
+class PlaceCache {
+ public:
+  /// Of places over the box at least, divided at least nearly as finely as its own would be.
+  std::shared_ptr<const PlaceIndex> over(const ContourIndex& index, const VisibleSetConfig& config,
+                                         const Eigen::AlignedBox3d& box);
+
+ private:
+  struct Entry {
+    std::uint64_t map;  ///< its fingerprint
+    VisibleSetConfig config;
+    Eigen::AlignedBox3d box;
+    std::shared_ptr<const PlaceIndex> index;
+  };
+  std::mutex mutex_;
+  std::deque<Entry> entries_;
+};
+
+}  // namespace evpose

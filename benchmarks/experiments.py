@@ -118,7 +118,7 @@ def make_calibration(bench):
         words = [data, "--only", name]
         if name in CALIBRATION_FLIGHTS:
             flight = bench.simulated(CALIBRATION_FLIGHTS[name], CALIBRATION_FLIGHT_S, ("camera.size=vga",))
-            words = ["--recording", flight.folder, "--map", flight.contours, "--occluders", flight.mesh]
+            words = [flight.folder.parent, "--only", flight.folder.name]
         text = bench.once(f"calibration-errors by second, {name}", lambda: bench.run("bench", "calibration-errors", *words, *draws))
         return {heading: [{**row, "recording": name} for row in rows] for heading, rows in tables.read(text).items()}
 

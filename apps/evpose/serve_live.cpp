@@ -131,10 +131,10 @@ class TrackerMaker {
 };
 
 /// Of the settings and what they say of other parts.
-SessionConfig session_config(const ServeConfig& config, const TrackJob& job) {
+SessionConfig session_config(const ServeConfig& config, const TrackJob& job, bool live) {
   SessionConfig out = config.session;
   out.search = relocalization_config(job.config.tracker);
-  out.waits = !config.queue.shed;
+  out.waits = !live && config.replay.speed == 0;
   return out;
 }
 
@@ -202,10 +202,12 @@ Expected<RunOutcome> finish(RunFolder& run, const TrackJob& job, const ServeRequ
                             ServeConfig& config, const Session& session, const StreamQueue& queue,
                             const Beginning& begin) {
   if (session.counts().updates == 0 || session.tracker() == nullptr)
-    return Error{request.track.recording,
-                 session.counts().searches > 0 ? "the stream ended before the pose was found"
-                                               : "the stream ended before the first update",
-                 "check that events and IMU arrive and cover the start"};
+    return session.searching()
+               ? Error{request.track.recording, "the stream ended before the first pose was found",
+                       "give it seconds more, a better --init, or the calibration's sigmas "
+                       "(docs/use/live.md)"}
+               : Error{request.track.recording, "the stream ended before the first update",
+                       "check that events and IMU arrive and cover the start"};
   RunSummary summary = summarise(job, request.track, *session.tracker(), session.tracker()->calibration());
   summary.events_read = session.counts().events - session.counts().events_shed;
   summary.events_kept += session.counts().events_kept;
@@ -278,7 +280,7 @@ Expected<int> serve(const ServeRequest& request) {
   if (auto ok = outputs.open(request, *config, *job); !ok) return ok.error();
 
   Session session(
-      session_config(*config, *job), job->recording.has_imu, maker->first_start(),
+      session_config(*config, *job, live), job->recording.has_imu, maker->first_start(),
       live ? std::nullopt : std::optional(job->start.t),
       [&](const TrackerStart& start) { return maker->make(start); },
       {[&](const Update& u, TimeNs offset, Tracker& tracker) { outputs.add(u, offset, tracker); },

@@ -85,6 +85,7 @@ void Session::check_stall(Stream& stream, TimeNs now_ns) {
 }
 
 void Session::tick(TimeNs now_ns) {
+  if (config_.waits) return;  // so does the source
   check_stall(events_, now_ns);
   if (has_imu_) check_stall(imu_, now_ns);
 }

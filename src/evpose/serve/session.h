@@ -58,6 +58,8 @@ class Session {
   /// Back to the start pose.
   void reset(const std::string& why);
 
+  /// A pose is being found beside.
+  bool searching() const { return searching_; }
   const Tracker* tracker() const { return tracker_.get(); }
   struct Counts {
     std::uint64_t updates = 0, restarts = 0, stalls = 0, searches = 0, found = 0;

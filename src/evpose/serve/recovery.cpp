@@ -11,8 +11,10 @@ namespace evpose {
 namespace {
 
 constexpr TimeNs kCaughtUp = 20 * kNsPerMs;  // the rest is tracked when the tracker is taken
-constexpr double kShareBehind = 0.1;         // of the contours, while it catches up
-constexpr TimeNs kBurst = 20 * kNsPerMs;     // so much of the share may come at once
+// While it catches up: of the contours, and of the updates.
+constexpr double kShareBehind = 0.1;
+constexpr int kStrideBehind = 3;
+constexpr TimeNs kBurst = 20 * kNsPerMs;  // so much of the share may come at once
 
 }  // namespace
 
@@ -55,6 +57,11 @@ TimeNs Recovery::reached() const {
   return last_ ? last_->t : std::numeric_limits<TimeNs>::min() / 2;
 }
 
+bool Recovery::tracks() const {
+  const std::lock_guard lock(mutex_);
+  return last_ && last_->health == Health::tracking;
+}
+
 bool Recovery::needs_search() const {
   const std::lock_guard lock(mutex_);
   return needs_search_;
@@ -93,8 +100,9 @@ void Recovery::add_events(const EventPacket& packet) {
 void Recovery::feed(const Item& item, TimeNs newest) {
   if (const auto* sample = std::get_if<ImuSample>(&item)) return tracker_->add_imu(*sample);
   const EventPacket& packet = std::get<EventPacket>(item);
-  const bool behind = packet.time(packet.events.back()) < newest - kCaughtUp;
-  tracker_->limit_event_share(behind && !tracker_->searching() ? kShareBehind : 1);
+  const bool hurries = packet.time(packet.events.back()) < newest - kCaughtUp && !tracker_->searching();
+  tracker_->limit_event_share(hurries ? kShareBehind : 1);
+  tracker_->set_update_stride(hurries ? kStrideBehind : 1);
   tracker_->add_events(packet);
 }
 
@@ -144,6 +152,7 @@ std::unique_ptr<Tracker> Recovery::take() {
   tracker_->search_no_more();
   for (const Item& item : items_) feed(item, share_.newest());
   tracker_->limit_event_share(1);
+  tracker_->set_update_stride(1);
   return std::move(tracker_);
 }
 

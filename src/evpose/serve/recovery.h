@@ -34,8 +34,8 @@ class EvenShare {
 /// The queue is bounded: of more events than kMost_mev_s an even share is taken.
 class Recovery {
  public:
-  static constexpr double kMost_mev_s = 6;
-  static constexpr std::size_t kMostWaiting = 30'000'000;  ///< events; five seconds of search
+  static constexpr double kMost_mev_s = 3;
+  static constexpr std::size_t kMostWaiting = 30'000'000;  ///< events; ten seconds of search
 
   using Make = std::function<Expected<std::unique_ptr<Tracker>>()>;
   /// `make` is called on the thread; events that come before it is done are left out. `waits`: add_...()
@@ -52,6 +52,8 @@ class Recovery {
   std::unique_ptr<Tracker> take();
   /// The data time that its tracker has come to; lowest before its first update.
   TimeNs reached() const;
+  /// Its tracker has the pose, and catches up if it has not been taken.
+  bool tracks() const;
   /// Its tracker does not search, and has to.
   bool needs_search() const;
   /// It cannot be made, or too much waits.

@@ -292,8 +292,8 @@ void Session::mind_search() {
   } else if (recovery_ && tracker_ && tracks_) {
     end_search();
   } else if (recovery_) {
-    const bool long_enough =
-        width_ < kAnywhere && has_imu_ && recovery_->reached() - search_began_ > kLongest[width_];
+    const bool long_enough = width_ < kAnywhere && has_imu_ && !recovery_->tracks() &&
+                             recovery_->reached() - search_began_ > kLongest[width_];
     const bool astray = recovery_->needs_search();
     if (!long_enough && !astray && !recovery_->failed()) return;
     give_up_search();

@@ -50,6 +50,7 @@ BENCHMARKS = {
     "latency": ("latency", "make", "stages of an update on whole recordings, and at high rates", "3 min"),
     "performance": ("performance", "make", "kernels and decoders by themselves (evpose_microbench)", "10 min"),
     "live": ("live", "make", "delay of evpose serve", "1 min"),
+    "live-starts": ("live_starts", "make", "first poses of evpose serve, from starts known well, badly or not at all", "5 min"),
     "soak": ("live", "make_soak", "memory of evpose serve over half an hour", "30 min"),
     "simulator-speed": ("simulator_speed", "make", "processor time of the simulator", "5 min"),
     "simulator-peer": ("simulator_peer", "make", "the simulator beside an independent one; its pictures", "10 min"),

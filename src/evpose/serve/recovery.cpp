@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/serve/recovery.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,6 +17,7 @@ constexpr TimeNs kCaughtUp = 20 * kNsPerMs;  // the rest is tracked when the tra
 // While it catches up: of the contours, and of the updates.
 constexpr double kShareBehind = 0.1;
 constexpr int kStrideBehind = 3;
+constexpr int kNice = 10;                    // the poses that are sent come first
 constexpr TimeNs kBurst = 20 * kNsPerMs;  // so much of the share may come at once
 
 }  // namespace
@@ -107,6 +111,7 @@ void Recovery::feed(const Item& item, TimeNs newest) {
 }
 
 void Recovery::run(const Make& make) {
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);  // of this thread alone
   auto made = make();
   std::unique_lock lock(mutex_);
   if (made) {

@@ -94,6 +94,13 @@ def make_relocalization(bench):
     return bench.write_page("relocalization", {"starts": lines, "wrong": [told, "", *wrong.splitlines()]})
 
 
+def make_kidnapping(bench):
+    seeds, only = (1, "room_spiral") if bench.quick else (10, "room_spiral,courtyard_landing")
+    printed = bench.once(f"kidnap: {seeds}", lambda: bench.run("bench", "kidnap", bench.shared / "data/peer", "--seeds", seeds,
+                                                               "--only", only))
+    return bench.write_page("kidnapping", {"kidnap": printed.strip().splitlines()})
+
+
 def make_faults(bench):
     few = ["--only", "room_720p", "--replays", 12] if bench.quick else []
     printed = bench.once("faults", lambda: bench.run("bench", "faults", bench.shared / "data/peer", *few))

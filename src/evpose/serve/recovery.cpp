@@ -17,7 +17,7 @@ constexpr TimeNs kCaughtUp = 20 * kNsPerMs;  // the rest is tracked when the tra
 // While it catches up: of the contours, and of the updates.
 constexpr double kShareBehind = 0.1;
 constexpr int kStrideBehind = 3;
-constexpr int kNice = 10;                    // the poses that are sent come first
+constexpr int kNice = 10;                 // the poses that are sent come first
 constexpr TimeNs kBurst = 20 * kNsPerMs;  // so much of the share may come at once
 
 }  // namespace

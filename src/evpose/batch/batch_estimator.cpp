@@ -56,14 +56,12 @@ CalibrationSigma sigma_of(const Calibration& known) {
   return out;
 }
 
-Status check_view(const TrackJob& job, const std::vector<Update>& updates) {
+Status check_view(const TrackJob& job, const Tracker& tracker, const std::vector<Update>& updates) {
   if (updates.empty())
     return Error{job.recording.folder, "the streams end before the first update",
                  "check that events and IMU cover the start"};
   if (std::ranges::any_of(updates, [](const Update& u) { return u.points > 0; })) return {};
-  return Error{job.map->source,
-               text("none of the map's ", job.map->points.size(), " points ever comes into view"),
-               "check the map's frame, the start pose and the extrinsics T_cam_imu"};
+  return nothing_compared(job, tracker);
 }
 
 }  // namespace
@@ -102,7 +100,7 @@ Status BatchEstimator::filter(const TrackRequest& request, const Progress& progr
   if (interrupted_) return {};
   parameters_->add(widened((*tracker)->calibration()));
   summary_ = summarise(job_, request, **tracker, (*tracker)->calibration());
-  return check_view(job_, updates_);
+  return check_view(job_, **tracker, updates_);
 }
 
 Status BatchEstimator::begin_along(std::vector<FusionState> trajectory, const Calibration& found) {

@@ -248,6 +248,19 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   return job;
 }
 
+Error nothing_compared(const TrackJob& job, const Tracker& tracker) {
+  const std::string finding = job.findings.empty() ? "" : job.findings.front().line() + "; ";
+  if (tracker.searching())
+    return {"start pose", "was not found where it was searched",
+            finding + "check map and calibration; a better --init makes the search smaller"};
+  if (tracker.aligns_start())
+    return {job.recording.calibration_path,
+            "at no errors that its sigmas allow do the contours of the first view lie on the events",
+            finding + "check --init, map and calibration; give one that is nearer, or larger sigmas"};
+  return {job.map->source, text("none of the map's ", job.map->points.size(), " points ever comes into view"),
+          finding + "check the map's frame, the start pose and the extrinsics T_cam_imu"};
+}
+
 std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibration& found) {
   const Recording& recording = job.recording;
   RunCalibration out;
@@ -368,11 +381,7 @@ Expected<RunOutcome> track_recording(const TrackRequest& request) {
   if (updates == 0)
     return Error{request.recording, "the streams end before the first update",
                  "check that events and IMU cover the start"};
-  if (most_points == 0 && !interrupted)
-    return Error{job->map->source,
-                 text("none of the map's ", job->map->points.size(), " points ever comes into view"),
-                 (job->findings.empty() ? "" : job->findings.front().line() + "; ") +
-                     "check the map's frame, the start pose and the extrinsics T_cam_imu"};
+  if (most_points == 0 && !interrupted) return nothing_compared(*job, **tracker);
   if (!request.learnt_map.empty())
     if (auto ok = write_learnt_map(request.learnt_map, *job->map, **tracker); !ok) return ok.error();
 

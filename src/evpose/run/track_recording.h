@@ -54,6 +54,8 @@ struct TrackJob {
   TrackerSetup setup;
   std::vector<Error> findings;  ///< what looks wrong although it can be tracked
 };
+/// Why a tracker that has seen all data has never compared a map point with them.
+Error nothing_compared(const TrackJob& job, const Tracker& tracker);
 /// Of the request's map, or the recording's own.
 Expected<std::string> map_path(const TrackRequest& request, const Recording& recording);
 /// All of that map.

@@ -104,8 +104,7 @@ void Outputs::restarted(const std::string& why) {
 std::optional<TrackerStart> Outputs::whereabouts() const {
   const auto place = reporter_ ? reporter_->vehicle_place(monotonic_ns()) : std::nullopt;
   if (!place) return {};
-  constexpr double kGps_m = 3, kCompass_rad = 0.35;
-  return TrackerStart{{0, place->T_map_body}, kGps_m, place->has_heading ? kCompass_rad : M_PI};
+  return TrackerStart{{0, place->T_map_body}, kByGps_m, place->has_heading ? kByCompass_rad : M_PI};
 }
 
 void Outputs::notice(const std::string& words) {

@@ -290,7 +290,8 @@ void Reporter::handle(const Frame& frame, TimeNs now_ns) {
   } else if (const auto origin = decode<GpsGlobalOrigin>(frame)) {
     origin_confirmed_ = true;
   } else if (const auto place = decode<GlobalPositionInt>(frame)) {
-    if (config_.origin_latitude_deg == 0 && config_.origin_longitude_deg == 0) return;
+    const bool others = vehicle_ && frame.system != *vehicle_;
+    if (others || (config_.origin_latitude_deg == 0 && config_.origin_longitude_deg == 0)) return;
     place_ = place_of(*place);
     place_heard_ = now_ns;
   }

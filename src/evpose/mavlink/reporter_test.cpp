@@ -98,6 +98,17 @@ TEST_F(VehiclePlaceLaws, IsWhatTheSentPoseSays) {
   EXPECT_NEAR(euler_of(ned.q_ned_frd).head<2>().norm(), 0, 1e-9);
 }
 
+TEST_F(VehiclePlaceLaws, IsNotThatOfAnotherVehicle) {
+  Reporter reporter(config_, frames_, [](Bytes) {});
+  Heartbeat ours;
+  ours.autopilot = 3;
+  reporter.receive(encode(ours, 0, 9, 1).bytes(), kNsPerS);
+  reporter.receive(encode(message_, 1, 7, 1).bytes(), kNsPerS);
+  EXPECT_FALSE(reporter.vehicle_place(kNsPerS));
+  reporter.receive(encode(message_, 2, 9, 1).bytes(), kNsPerS);
+  EXPECT_TRUE(reporter.vehicle_place(kNsPerS));
+}
+
 TEST_F(VehiclePlaceLaws, IsForgottenAndNeedsAnOrigin) {
   EXPECT_FALSE(heard(3 * kNsPerS));
   config_.origin_latitude_deg = config_.origin_longitude_deg = 0;

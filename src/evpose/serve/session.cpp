@@ -22,10 +22,11 @@ constexpr double kMovedOn_m_s = 1, kMostMovedOn_m = 5, kTurnedOn_rad_s = 0.5;
 // first two for so long, of data.
 constexpr int kAround = 0, kByGps = 1, kAnywhere = 2;
 constexpr TimeNs kLongest[] = {4 * kNsPerS, 12 * kNsPerS};
-constexpr double kGps_m = 3, kCompass_rad = 0.35, kAnywhere_m = 1e3, kAnywhere_rad = M_PI;
+constexpr double kAnywhere_m = 1e3, kAnywhere_rad = M_PI;
+constexpr TimeNs kBetween = kNsPerS / 10;  // begins of searches: one may fail at once
 
 int width_of(const TrackerStart& start) {
-  return start.position_sigma_m < kGps_m        ? kAround
+  return start.position_sigma_m < kByGps_m      ? kAround
          : start.position_sigma_m < kAnywhere_m ? kByGps
                                                 : kAnywhere;
 }
@@ -249,8 +250,8 @@ TrackerStart Session::where_to_search() const {
   if (const auto told = width_ == kByGps && hooks_.whereabouts ? hooks_.whereabouts() : std::nullopt) {
     out = *told;
   } else if (width_ >= kByGps) {
-    out.position_sigma_m = width_ == kAnywhere ? kAnywhere_m : kGps_m;
-    out.rotation_sigma_rad = width_ == kAnywhere ? kAnywhere_rad : kCompass_rad;
+    out.position_sigma_m = width_ == kAnywhere ? kAnywhere_m : kByGps_m;
+    out.rotation_sigma_rad = width_ == kAnywhere ? kAnywhere_rad : kByCompass_rad;
   }
   out.searches = true;
   out.state.t = has_imu_ ? std::max(events_.last, imu_.last) : events_.last;
@@ -276,6 +277,7 @@ void Session::give_up_search() {
 void Session::end_search() {
   give_up_search();
   searching_ = tracks_ = false;
+  search_began_ = kNever;
   width_ = kAround;
 }
 
@@ -299,7 +301,7 @@ void Session::mind_search() {
     give_up_search();
     if (has_imu_ && !astray) width_ = std::min(width_ + 1, kAnywhere);
   } else if (config_.search.on && (searching_ || (tracker_ && tracker_->needs_search())) &&
-             given_up_.empty()) {
+             given_up_.empty() && events_.last >= search_began_ + kBetween) {
     begin_beside(where_to_search());
   }
 }

@@ -114,8 +114,9 @@ class Session {
   std::unique_ptr<Recovery> recovery_;               ///< the search, if one goes on
   std::vector<std::unique_ptr<Recovery>> given_up_;  ///< until their threads have ended
   bool by_search_ = false;                           ///< it searches, and does not just align the first view
-  TimeNs search_began_ = 0;                          ///< data time
-  int width_ = 0;                                    ///< of the search
+  static constexpr TimeNs kNever = std::numeric_limits<TimeNs>::min() / 2;
+  TimeNs search_began_ = kNever;  ///< data time
+  int width_ = 0;                 ///< of the search
   Stream events_{"events"}, imu_{"IMU"};
   std::deque<ImuSample> before_;  ///< IMU samples that came before there was a tracker
   std::optional<Update> last_valid_;

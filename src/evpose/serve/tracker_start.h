@@ -8,6 +8,9 @@
 
 namespace evpose {
 
+/// How well GPS and a compass know a pose, 1 sigma per axis.
+inline constexpr double kByGps_m = 3, kByCompass_rad = 0.35;
+
 /// Where a tracker of a live stream begins, and how well that is known.
 struct TrackerStart {
   StartState state;

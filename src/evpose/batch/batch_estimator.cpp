@@ -67,10 +67,11 @@ Status check_view(const TrackJob& job, const Tracker& tracker, const std::vector
 }  // namespace
 
 /// The filter at what is known of the parameters by now; they are made if there are none.
-Expected<std::unique_ptr<Tracker>> BatchEstimator::make_filter() {
+Expected<std::unique_ptr<Tracker>> BatchEstimator::make_filter(const Eigen::MatrixXd& correlation) {
   const TrackJob job = parameters_ ? at_present_values() : job_;
   TrackerSetup setup = job.setup;
   if (parameters_) setup.calibration_sigma = sigma_of(parameters_->calibration());
+  if (setup.calibration_sigma && correlation.size() > 0) setup.calibration_sigma->correlation = correlation;
   if (setup.calibration_sigma) setup.calibration_sigma->time_s = 0;
   FusionConfig resolved;
   const auto make = [&](const FusionConfig& config) {
@@ -86,8 +87,9 @@ Expected<std::unique_ptr<Tracker>> BatchEstimator::make_filter() {
   return tracker;
 }
 
-Status BatchEstimator::filter(const TrackRequest& request, const Progress& progress) {
-  auto tracker = make_filter();
+Status BatchEstimator::filter(const TrackRequest& request, const Progress& progress,
+                              const Eigen::MatrixXd& correlation) {
+  auto tracker = make_filter(correlation);
   if (!tracker) return tracker.error();
   trajectory_ = {(*tracker)->state()};
   updates_.clear();

@@ -37,9 +37,11 @@ class BatchEstimator {
   /// What is told the share of a pass, 0..1, and ends it by false.
   using Progress = std::function<bool(double)>;
 
-  /// The filter's run, from what is known of the parameters by now. Error: a recording that cannot be read,
-  /// or in which nothing comes into view.
-  Status filter(const TrackRequest& request, const Progress& progress);
+  /// The filter's run, from what is known of the parameters by now. `correlation`: of their errors, as
+  /// CalibrationSigma has it; empty: independent. Error: a recording that cannot be read, or in which nothing
+  /// comes into view.
+  Status filter(const TrackRequest& request, const Progress& progress,
+                const Eigen::MatrixXd& correlation = {});
   /// In place of filter(), what another run has estimated: the states at the start and at each update after
   /// it, with the covariances of their poses, and the calibration. The start is the first state's.
   Status begin_along(std::vector<FusionState> trajectory, const Calibration& found);
@@ -71,7 +73,7 @@ class BatchEstimator {
   const TrackerSetup& followed() const { return followed_; }
 
  private:
-  Expected<std::unique_ptr<Tracker>> make_filter();
+  Expected<std::unique_ptr<Tracker>> make_filter(const Eigen::MatrixXd& correlation = {});
   Expected<std::unique_ptr<Tracker>> follow(const Progress& progress);
 
   TrackJob job_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "evpose/calibrate/event_slices.h"
+#include "evpose/calibrate/image_modes.h"
 #include "evpose/camera/adjusted_camera.h"
 #include "evpose/core/log.h"
 #include "evpose/fusion/state_propagator.h"
@@ -32,13 +33,13 @@ Calibration given_calibration(const TrackJob& job) {
 namespace {
 
 constexpr double kBridged_px = 4;  // that the alignment of the start bridges: its first gate
-constexpr double kReach = 2;       // sigmas to each side
+constexpr double kReach = 2.5;     // sigmas to each side
 constexpr double kStep_px = 8;     // of the coarse grid: the reach of a coarse edge
-constexpr std::size_t kKept = 6;   // of its cameras are refined
+constexpr std::size_t kKept = 10;  // of its cameras are refined
 constexpr double kCoarseSteps_px[] = {8, 4}, kFineSteps_px[] = {6, 3, 1.5, 0.75};
 constexpr double kRollSigma_rad = 0.02;  // at least: that of a start pose
 constexpr int kMostSweeps = 20;          // at each step
-constexpr double kSigma_px = 2;          // of each mode of what is found
+constexpr double kSigma_px = 1;          // of each mode of what is found
 constexpr std::size_t kSlices = 6;
 constexpr TimeNs kApart = 50 * kNsPerMs;  // slices; the pose follows from the IMU
 constexpr std::size_t kLaterSlices = 16;  // over a whole trajectory
@@ -50,35 +51,7 @@ constexpr int kPoints = 700;
 constexpr double kMarginOfWidth =
     0.2;  // in which the given camera, without barrel distortion, sees the corners
 
-/// What is tried: the intrinsic numbers, and last an angle about the optical axis, rad, which a principal
-/// point cannot stand in for as it can for the others.
-using Trial = Eigen::VectorXd;
-
-/// Changes that move what is seen by up to one pixel, each in a way of its own: focal length, cubic and
-/// quintic radial terms without what lower ones can do (Zernike's radial polynomials), principal point, roll.
-struct Modes {
-  Eigen::VectorXd focal, cubic, quintic, cx, cy, roll;  ///< empty: the model has none
-  std::array<const Eigen::VectorXd*, 6> all() const { return {&focal, &cx, &cy, &roll, &cubic, &quintic}; }
-};
-
-/// `n`: of the intrinsic numbers.
-Modes modes_of(const CameraIntrinsics& camera, Eigen::Index n) {
-  const double corner_px = 0.5 * std::hypot(camera.size.width, camera.size.height), r = corner_px / camera.fx;
-  Modes out;
-  for (Eigen::VectorXd* mode : {&out.focal, &out.cx, &out.cy, &out.roll}) mode->setZero(n + 1);
-  out.focal(0) = camera.fx / corner_px;
-  out.focal(1) = camera.fy / corner_px;
-  out.cx(2) = out.cy(3) = 1;
-  out.roll(n) = 1 / corner_px;
-  // Double sphere has a shape of its own: it is left to the alignment.
-  if (n < 6 || camera.distortion_model == "ds") return out;
-  // 3 (r^3 - 2/3 r) and 10 (r^5 - 6/5 r^3 + 3/10 r), at most 1 in between.
-  const Eigen::VectorXd cube = Eigen::VectorXd::Unit(n + 1, 4) / (corner_px * r * r),
-                        fifth = Eigen::VectorXd::Unit(n + 1, 5) / (corner_px * r * r * r * r);
-  out.cubic = 3 * (cube - 2.0 / 3 * out.focal);
-  out.quintic = 10 * (fifth - 1.2 * cube + 0.3 * out.focal);
-  return out;
-}
+using Trial = Eigen::VectorXd;  ///< as ImageModes has it
 
 /// Of the body, at these times, by the IMU from the start; without one as it moved there.
 Expected<std::vector<Pose>> poses_at(const TrackJob& job, const FusionConfig& fusion,
@@ -173,7 +146,7 @@ struct Scored {
 };
 
 /// The best of a grid, that differ, best first.
-std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const Trial& reach) {
+std::vector<Scored> best_of_grid(const Trials& trials, const ImageModes& modes, const Trial& reach) {
   const auto count = [&](const Trial& mode, Eigen::Index number) {
     return mode.size() == 0 ? 0 : static_cast<int>(std::ceil(reach(number) / (kStep_px * mode(number))));
   };
@@ -185,8 +158,9 @@ std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const
     for (int k = -cubic_count; k <= cubic_count; ++k)
       for (int x = -centre_count; x <= centre_count; ++x)
         for (int y = -centre_count; y <= centre_count; ++y) {
-          const Trial trial = kStep_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
-          all.push_back({trial, trials.score(trial, EdgeSpread::coarse, 1)});
+          const Trial on_grid = kStep_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
+          const Trial trial = on_grid.cwiseMin(reach).cwiseMax(-reach);
+          all.push_back({trial, trials.score(trial, EdgeSpread::coarse, trials.size())});
         }
   std::ranges::stable_sort(all, std::greater(), &Scored::score);
   std::vector<Scored> out;
@@ -205,31 +179,34 @@ std::vector<Scored> best_of_grid(const Trials& trials, const Modes& modes, const
 /// What is not known of the given calibration, and how it is tried.
 struct Unknowns {
   explicit Unknowns(const TrackJob& job)
-      : given(given_calibration(job)), modes(modes_of(*job.setup.intrinsics, given.intrinsics.size())) {
+      : given(given_calibration(job)), modes(image_modes(*job.setup.intrinsics, given.intrinsics.size())) {
     reach.resize(given.intrinsics.size() + 1);
     reach << kReach * given.intrinsics_sigma,
         kReach * std::max(kRollSigma_rad, given.turn_sigma_rad.maxCoeff());
   }
 
   Calibration given;
-  Modes modes;
+  ImageModes modes;
   Trial reach;
 
   bool beyond(const Trial& trial) const { return (trial.cwiseAbs().array() > reach.array() + 1e-12).any(); }
-  /// Known to some pixels in each mode; tangential terms and higher radial ones are as they were.
-  void take(const Trial& trial, const Pose& T_body_cam, Calibration* found) const {
+  /// What has been found; `job` as it was given.
+  void take(const Trial& trial, const TrackJob& job, const Pose& T_body_cam, CoarseCamera* found) const {
     const Eigen::Index n = given.intrinsics.size();
-    found->intrinsics = trial.head(n);
+    Calibration& c = found->calibration;
+    c.intrinsics = trial.head(n);
     const Eigen::Vector3d axis = T_body_cam.q * Eigen::Vector3d::UnitZ();
-    if (!given.turn_sigma_rad.isZero(0)) found->turn = (so3::exp(trial(n) * axis) * found->turn).normalized();
-    found->turn_sigma_rad = given.turn_sigma_rad;
-    Eigen::VectorXd square = Eigen::VectorXd::Zero(n);
-    for (const Eigen::VectorXd* mode : modes.all())
-      if (mode->size() > 0) square += (kSigma_px * mode->head(n)).cwiseAbs2();
-    found->intrinsics_sigma = given.intrinsics_sigma;
-    for (Eigen::Index i = 0; i < n; ++i)
-      if (square(i) > 0)
-        found->intrinsics_sigma(i) = std::min(given.intrinsics_sigma(i), std::sqrt(square(i)));
+    if (!given.turn_sigma_rad.isZero(0)) c.turn = (so3::exp(trial(n) * axis) * c.turn).normalized();
+    c.turn_sigma_rad = given.turn_sigma_rad;
+    CalibrationSigma stated = *job.setup.calibration_sigma;
+    if (!job.recording.has_imu) stated.rotation_rad = Eigen::Vector3d::Zero();  // the pose is the camera's
+    const Eigen::MatrixXd C =
+        covariance_of_found(modes, *job.setup.intrinsics, stated, T_body_cam.q, kSigma_px);
+    const Eigen::VectorXd sigma = C.diagonal().cwiseSqrt();
+    c.intrinsics_sigma = sigma.head(n);
+    const Eigen::VectorXd weight = (sigma.array() > 0).select(sigma.cwiseInverse(), 0);
+    found->correlation = weight.asDiagonal() * C * weight.asDiagonal();
+    found->correlation.diagonal().setOnes();
   }
 };
 
@@ -310,11 +287,11 @@ double uncertain_px(const CameraIntrinsics& camera, const Eigen::VectorXd& sigma
 
 }  // namespace
 
-Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fusion) {
+Expected<CoarseCamera> coarse_camera(const TrackJob& job, const FusionConfig& fusion) {
   Unknowns unknowns(job);
   unknowns.modes.roll.resize(0);  // the start's pose and the mounting have more than one way to be off
-  Calibration out = unknowns.given;
-  if (uncertain_px(*job.setup.intrinsics, out.intrinsics_sigma) < kBridged_px) return out;
+  CoarseCamera out{unknowns.given, {}};
+  if (uncertain_px(*job.setup.intrinsics, unknowns.given.intrinsics_sigma) < kBridged_px) return out;
   Trials trials(job, job.setup.T_body_cam, 2 * kReach * kStep_px);
   if (auto ok = add_slices(job, fusion, &trials); !ok) return ok.error();
   if (trials.size() == 0) return out;
@@ -323,22 +300,24 @@ Expected<Calibration> coarse_camera(const TrackJob& job, const FusionConfig& fus
     refine(trials, unknowns, EdgeSpread::fine, kFineSteps_px, &tried);
     if (!best || tried.score > best->score) best = std::move(tried);
   }
-  unknowns.take(best->trial, job.setup.T_body_cam, &out);
+  unknowns.take(best->trial, job, job.setup.T_body_cam, &out);
   return out;
 }
 
 Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionState> trajectory,
-                                   Calibration* found) {
+                                   CoarseCamera* found) {
   const Unknowns unknowns(job);
   if (unknowns.modes.cubic.size() == 0 ||
       uncertain_px(*job.setup.intrinsics, unknowns.given.intrinsics_sigma) < kBridged_px)
     return false;
-  const Pose T_body_cam{found->turn * job.setup.T_body_cam.q, job.setup.T_body_cam.p + found->shift};
+  const Pose T_body_cam{found->calibration.turn * job.setup.T_body_cam.q,
+                        job.setup.T_body_cam.p + found->calibration.shift};
   Trials trials(job, T_body_cam, kMarginOfWidth * job.setup.intrinsics->size.width);
   if (auto ok = add_slices_along(job, trajectory, &trials); !ok) return ok.error();
   if (trials.size() == 0) return false;
-  Scored here{Trial::Zero(found->intrinsics.size() + 1), 0};
-  here.trial.head(found->intrinsics.size()) = found->intrinsics;
+  const Eigen::VectorXd& numbers = found->calibration.intrinsics;
+  Scored here{Trial::Zero(numbers.size() + 1), 0};
+  here.trial.head(numbers.size()) = numbers;
   refine(trials, unknowns, &here);
   std::optional<Scored> best;
   for (const int k : kFarSteps)
@@ -353,7 +332,7 @@ Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionSt
     log_detail(text("cameras along the flight: ", here.score, " as found, ", best->score,
                     " with other radial terms"));
   if (!best || best->score < here.score + kBetter) return false;
-  unknowns.take(best->trial, T_body_cam, found);
+  unknowns.take(best->trial, job, T_body_cam, found);
   return true;
 }
 

@@ -76,6 +76,14 @@ void join_with_given(StaticParameters* parameters) {
   parameters->correct(parameters->solve(told));
 }
 
+/// Events that the accepted updates of the second half found at the contours.
+std::int64_t events_at_contours(std::span<const Update> updates) {
+  std::int64_t out = 0;
+  for (const Update& u : updates.subspan(updates.size() / 2))
+    if (u.accepted) out += u.events_matched;
+  return out;
+}
+
 /// Why updates are not accepted, as it was said last.
 std::string reason_of(std::span<const Update> updates) {
   for (auto u = updates.rbegin(); u != updates.rend(); ++u)
@@ -117,32 +125,34 @@ Status JointCalibration::begin_parameters() {
   auto fusion = resolved(job.config.tracker.fusion, states_errors(*job.map));
   if (!fusion) return fusion.error();
   choose_states(job.setup, *fusion);
-  auto coarse = board_ ? Expected(given_calibration(job)) : coarse_camera(job, *fusion);
+  auto coarse = board_ ? Expected(CoarseCamera{given_calibration(job), {}}) : coarse_camera(job, *fusion);
   if (!coarse) return coarse.error();
   if (board_) {
-    coarse->intrinsics = board_->intrinsics;
-    coarse->intrinsics_sigma = board_->intrinsics_sigma;
+    coarse->calibration.intrinsics = board_->intrinsics;
+    coarse->calibration.intrinsics_sigma = board_->intrinsics_sigma;
   }
   using enum StaticParameters::Shared;
   parameters_ = job.recording.has_imu
                     ? std::make_shared<StaticParameters>(*fusion, estimated, job.setup.imu_noise.axes)
                     : std::make_shared<StaticParameters>(*fusion, estimated);
-  parameters_->add(*coarse);
+  parameters_->add(coarse->calibration);
+  coarse_correlation_ = std::move(coarse->correlation);
   log_detail(text("coarse: ", values_words(*parameters_)));
   return {};
 }
 
-/// Whether the first flight, as the filter has it, shows another camera than the start did; one with which
-/// the filter loses the contours is none.
+/// Whether the first flight, as the filter has it, shows another camera than the start did: one with which
+/// the filter finds more events at the contours.
 Status JointCalibration::look_along_flight(const TrackRequest& request,
                                            const std::function<bool(double)>& progress) {
   const StaticParameters kept = *parameters_;
-  const double accepted = accepted_share(0);
+  const std::int64_t events = events_at_contours(flights_.front()->updates());
   const Calibration before = parameters_->calibration();
-  Calibration found = before;
-  const auto other = coarse_camera_along(jobs_.front(), flights_.front()->trajectory(), &found);
+  CoarseCamera seen{before, {}};
+  const auto other = coarse_camera_along(jobs_.front(), flights_.front()->trajectory(), &seen);
   if (!other) return other.error();
   if (!*other) return {};
+  Calibration& found = seen.calibration;
   found.intrinsics -= before.intrinsics;
   found.turn = found.turn * before.turn.conjugate();
   found.shift.setZero();
@@ -150,9 +160,8 @@ Status JointCalibration::look_along_flight(const TrackRequest& request,
   found.gravity_tilt_rad.setZero();
   parameters_->add(found);
   log_detail(text("along the flight: ", values_words(*parameters_)));
-  if (auto ok = flights_.front()->filter(request, progress); !ok || interrupted_) return ok;
-  constexpr double kAsGood = 0.9;
-  if (accepted_share(0) < kAsGood * accepted) *parameters_ = kept;
+  if (auto ok = flights_.front()->filter(request, progress, seen.correlation); !ok || interrupted_) return ok;
+  if (events_at_contours(flights_.front()->updates()) < events) *parameters_ = kept;
   return {};
 }
 
@@ -175,7 +184,8 @@ Status JointCalibration::begin(const TrackRequest& request, const Progress& prog
       const Calibration before = parameters_->calibration();
       if (board_) begin_before_board(flight, board_->sightings[k]);
       const auto told = [&](double share) { return go_on(progress, share); };
-      if (auto ok = flight.filter(request, told); !ok) return ok;
+      if (auto ok = flight.filter(request, told, run == 0 ? coarse_correlation_ : Eigen::MatrixXd()); !ok)
+        return ok;
       if (interrupted_) return {};
       if (board_) join_with_given(parameters_.get());
       log_detail(text("filter: ", std::lround(100 * share_of_accepted(flight.updates())), " % accepted, ",

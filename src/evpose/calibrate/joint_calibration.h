@@ -69,6 +69,7 @@ class JointCalibration {
   std::optional<BoardBeginning> board_;
   std::vector<std::unique_ptr<BatchEstimator>> flights_;
   std::shared_ptr<StaticParameters> parameters_;
+  Eigen::MatrixXd coarse_correlation_;
   std::vector<ResidualField> flight_residuals_;
   ResidualField residuals_;
   Eigen::VectorXd contradiction_;

@@ -61,16 +61,21 @@ std::optional<Error> doubt_start_place(const ContourMap& map, const Pose& T_map_
                "check --init, and that map and start share one frame and unit"};
 }
 
-std::optional<Error> doubt_start_attitude(const std::vector<ImuSample>& samples, const StartState& start,
-                                          const std::string& where) {
-  const auto first = std::lower_bound(samples.begin(), samples.end(), start.t,
-                                      [](const ImuSample& s, TimeNs t) { return s.t < t; });
+std::optional<Eigen::Vector3d> up_by_accelerometer(const std::vector<ImuSample>& samples, TimeNs t) {
+  const auto first = std::ranges::lower_bound(samples, t, {}, &ImuSample::t);
   ImuIncrement sum;
   for (auto a = first; a != samples.end() && a + 1 != samples.end() && sum.dt_s < kLookedAt_s; ++a)
     if ((a + 1)->t > a->t)
       sum = joined(sum, integrate(*a, *(a + 1), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()));
   if (sum.dt_s < kLeastLookedAt_s || sum.dv.norm() < 1e-3) return {};
-  const Eigen::Vector3d up = start.T_map_body.q * sum.dv.normalized();
+  return sum.dv.normalized();
+}
+
+std::optional<Error> doubt_start_attitude(const std::vector<ImuSample>& samples, const StartState& start,
+                                          const std::string& where) {
+  const auto up_body = up_by_accelerometer(samples, start.t);
+  if (!up_body) return {};
+  const Eigen::Vector3d up = start.T_map_body.q * *up_body;
   const double off_deg = kDegrees * std::acos(std::clamp(up.z(), -1.0, 1.0));
   if (off_deg < kSteepest_deg) return {};
   return Error{where,

@@ -21,6 +21,10 @@ std::optional<Error> doubt_map_size(const ContourMap& map);
 /// A start outside of the box that holds the map; across a map that is flat, any distance will do.
 std::optional<Error> doubt_start_place(const ContourMap& map, const Pose& T_map_body);
 
+/// Up by the accelerometer: the mean of the half second from `t` on, turned by the gyroscope to its
+/// beginning; unit vector, body frame. Unset: too few samples, or free fall.
+std::optional<Eigen::Vector3d> up_by_accelerometer(const std::vector<ImuSample>& samples, TimeNs t);
+
 /// A start at which the first half second of the accelerometer, turned into the map, does not show up.
 /// `where` names the IMU.
 std::optional<Error> doubt_start_attitude(const std::vector<ImuSample>& samples, const StartState& start,

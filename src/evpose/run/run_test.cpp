@@ -71,6 +71,7 @@ TEST(Plausibility, AStartWhoseUpIsNotThatOfTheAccelerometerIsDoubtedByTheAngle) 
   start.t = from_seconds(5);  // after the samples: nothing can be said
   EXPECT_FALSE(doubt_start_attitude(samples, start, "imu.csv"));
   EXPECT_FALSE(doubt_start_attitude({}, start, "imu.csv"));
+  EXPECT_FALSE(up_by_accelerometer({}, start.t));
 }
 
 TEST(RemainingTime, OfASteadyJobIsRightAfterItsFirstSeconds) {

@@ -241,8 +241,9 @@ Expected<TrackJob> prepare(const TrackRequest& request, const RunConfig& config)
   }
   auto job = make_job(request, config, *recording, std::move(truth));
   if (!job) return job;
-  if ((starts_anywhere(request.init) || starts_by_gps(request.init)) && !imu.empty())
-    job->start.T_map_body.q = Eigen::Quaterniond::FromTwoVectors(imu.front().accel, Eigen::Vector3d::UnitZ());
+  if (starts_anywhere(request.init) || starts_by_gps(request.init))
+    if (const auto up = up_by_accelerometer(imu, job->start.t))
+      job->start.T_map_body.q = Eigen::Quaterniond::FromTwoVectors(*up, Eigen::Vector3d::UnitZ());
   for (const Error& doubt : doubt_imu(imu, job->truth, job->start, recording->imu_path))
     job->findings.push_back(doubt);
   return job;

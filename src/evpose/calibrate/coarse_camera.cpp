@@ -37,15 +37,17 @@ constexpr double kReach = 2.5;     // sigmas to each side
 constexpr double kStep_px = 8;     // of the coarse grid: the reach of a coarse edge
 constexpr std::size_t kKept = 10;  // of its cameras are refined
 constexpr double kCoarseSteps_px[] = {8, 4}, kFineSteps_px[] = {6, 3, 1.5, 0.75};
-constexpr double kRollSigma_rad = 0.02;  // at least: that of a start pose
-constexpr int kMostSweeps = 20;          // at each step
-constexpr double kSigma_px = 1;          // of each mode of what is found
+constexpr double kRollSigma_rad = 0.02;     // at least: that of a start pose
+constexpr int kMostSweeps = 20;             // at each step
+constexpr double kCorrelatedPoints = 10;    // so many points share one error
+constexpr ImageSigma kSigma{1, 1.5, 2, 3};  // of what is found: the corners show least
 constexpr std::size_t kSlices = 6;
 constexpr TimeNs kApart = 50 * kNsPerMs;  // slices; the pose follows from the IMU
 constexpr std::size_t kLaterSlices = 16;  // over a whole trajectory
 constexpr int kFarSteps[] = {-2, -1, 0, 1, 2};
 constexpr double kFarCubic_px = 8, kFarQuintic_px = 5;
 constexpr double kBetter = 0.002;  // mean score by which another camera has to be, to be another one
+constexpr double kKnown = 1e-9;    // sigma of a number that is known
 constexpr double kStrideOfPoints_px = 8;
 constexpr int kPoints = 700;
 constexpr double kMarginOfWidth =
@@ -90,11 +92,13 @@ Expected<std::vector<Pose>> poses_at(const TrackJob& job, const FusionConfig& fu
 
 class Trials {
  public:
-  /// Points so far outside of the given camera's image are tried, too.
-  Trials(const TrackJob& job, const Pose& T_body_cam, double margin_px)
+  /// Points so far outside of the given camera's image are tried, too. `information`: of the intrinsic
+  /// numbers.
+  Trials(const TrackJob& job, const Pose& T_body_cam, double margin_px, const Eigen::MatrixXd& information)
       : job_(job),
         T_body_cam_(T_body_cam),
         margin_px_(margin_px),
+        information_(information),
         camera_(*job.setup.intrinsics),
         index_(*job.map) {}
 
@@ -109,21 +113,23 @@ class Trials {
     VisibleSet visible(index_, *job_.setup.camera, config);
     for (const std::uint32_t i : visible.choose(view.T_map_cam))
       view.points.push_back({job_.map->position(i), job_.map->points[i].tangent.cast<double>()});
+    evidence_ += static_cast<double>(view.points.size()) / kCorrelatedPoints;
   }
 
   std::size_t size() const { return views_.size(); }
 
-  /// In the first `views`; their mean.
-  double score(const Trial& trial, EdgeSpread spread, std::size_t views) const {
+  /// Mean of the views', with the share of what is known of the numbers.
+  double score(const Trial& trial, EdgeSpread spread) const {
     const auto n = trial.size() - 1;
     const auto camera = make_camera(corrected(camera_, trial.head(n)));
     const Pose rolled{so3::exp({0, 0, trial(n)}), Eigen::Vector3d::Zero()};
     constexpr double kNone = -1e9;
     if (!camera) return kNone;
     double out = 0;
-    for (std::size_t i = 0; i < views; ++i)
-      out += score_pose({views_[i].field, **camera, rolled, views_[i].points}, views_[i].T_map_cam, spread);
-    return out / static_cast<double>(views);
+    for (const View& v : views_)
+      out += score_pose({v.field, **camera, rolled, v.points}, v.T_map_cam, spread);
+    const double unlikely = 0.5 * trial.head(n).dot(information_ * trial.head(n));
+    return out / static_cast<double>(views_.size()) - unlikely / std::max(1.0, evidence_);
   }
 
  private:
@@ -135,9 +141,11 @@ class Trials {
   const TrackJob& job_;
   const Pose T_body_cam_;
   const double margin_px_;
+  Eigen::MatrixXd information_;
   const CameraIntrinsics& camera_;
   ContourIndex index_;
   std::vector<View> views_;
+  double evidence_ = 0;  ///< independent points
 };
 
 struct Scored {
@@ -160,7 +168,7 @@ std::vector<Scored> best_of_grid(const Trials& trials, const ImageModes& modes, 
         for (int y = -centre_count; y <= centre_count; ++y) {
           const Trial on_grid = kStep_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
           const Trial trial = on_grid.cwiseMin(reach).cwiseMax(-reach);
-          all.push_back({trial, trials.score(trial, EdgeSpread::coarse, trials.size())});
+          all.push_back({trial, trials.score(trial, EdgeSpread::coarse)});
         }
   std::ranges::stable_sort(all, std::greater(), &Scored::score);
   std::vector<Scored> out;
@@ -180,7 +188,11 @@ std::vector<Scored> best_of_grid(const Trials& trials, const ImageModes& modes, 
 struct Unknowns {
   explicit Unknowns(const TrackJob& job)
       : given(given_calibration(job)), modes(image_modes(*job.setup.intrinsics, given.intrinsics.size())) {
-    reach.resize(given.intrinsics.size() + 1);
+    const Eigen::Index n = given.intrinsics.size();
+    const Eigen::MatrixXd R = job.setup.calibration_sigma->of_correlation(*job.setup.intrinsics);
+    const Eigen::VectorXd sigma = given.intrinsics_sigma.cwiseMax(kKnown);
+    information = (sigma.asDiagonal() * R.topLeftCorner(n, n) * sigma.asDiagonal()).inverse();
+    reach.resize(n + 1);
     reach << kReach * given.intrinsics_sigma,
         kReach * std::max(kRollSigma_rad, given.turn_sigma_rad.maxCoeff());
   }
@@ -188,6 +200,7 @@ struct Unknowns {
   Calibration given;
   ImageModes modes;
   Trial reach;
+  Eigen::MatrixXd information;  ///< of the numbers, about what was given
 
   bool beyond(const Trial& trial) const { return (trial.cwiseAbs().array() > reach.array() + 1e-12).any(); }
   /// What has been found; `job` as it was given.
@@ -200,8 +213,7 @@ struct Unknowns {
     c.turn_sigma_rad = given.turn_sigma_rad;
     CalibrationSigma stated = *job.setup.calibration_sigma;
     if (!job.recording.has_imu) stated.rotation_rad = Eigen::Vector3d::Zero();  // the pose is the camera's
-    const Eigen::MatrixXd C =
-        covariance_of_found(modes, *job.setup.intrinsics, stated, T_body_cam.q, kSigma_px);
+    const Eigen::MatrixXd C = covariance_of_found(modes, *job.setup.intrinsics, stated, T_body_cam.q, kSigma);
     const Eigen::VectorXd sigma = C.diagonal().cwiseSqrt();
     c.intrinsics_sigma = sigma.head(n);
     const Eigen::VectorXd weight = (sigma.array() > 0).select(sigma.cwiseInverse(), 0);
@@ -213,7 +225,7 @@ struct Unknowns {
 /// Along each mode to and fro as long as it gets better, in ever smaller steps.
 void refine(const Trials& trials, const Unknowns& unknowns, EdgeSpread spread,
             std::span<const double> steps_px, Scored* best) {
-  const auto score = [&](const Trial& trial) { return trials.score(trial, spread, trials.size()); };
+  const auto score = [&](const Trial& trial) { return trials.score(trial, spread); };
   best->score = score(best->trial);
   for (const double step_px : steps_px)
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
@@ -292,7 +304,7 @@ Expected<CoarseCamera> coarse_camera(const TrackJob& job, const FusionConfig& fu
   unknowns.modes.roll.resize(0);  // the start's pose and the mounting have more than one way to be off
   CoarseCamera out{unknowns.given, {}};
   if (uncertain_px(*job.setup.intrinsics, unknowns.given.intrinsics_sigma) < kBridged_px) return out;
-  Trials trials(job, job.setup.T_body_cam, 2 * kReach * kStep_px);
+  Trials trials(job, job.setup.T_body_cam, 2 * kReach * kStep_px, unknowns.information);
   if (auto ok = add_slices(job, fusion, &trials); !ok) return ok.error();
   if (trials.size() == 0) return out;
   std::optional<Scored> best;
@@ -312,7 +324,7 @@ Expected<bool> coarse_camera_along(const TrackJob& job, std::span<const FusionSt
     return false;
   const Pose T_body_cam{found->calibration.turn * job.setup.T_body_cam.q,
                         job.setup.T_body_cam.p + found->calibration.shift};
-  Trials trials(job, T_body_cam, kMarginOfWidth * job.setup.intrinsics->size.width);
+  Trials trials(job, T_body_cam, kMarginOfWidth * job.setup.intrinsics->size.width, unknowns.information);
   if (auto ok = add_slices_along(job, trajectory, &trials); !ok) return ok.error();
   if (trials.size() == 0) return false;
   const Eigen::VectorXd& numbers = found->calibration.intrinsics;

@@ -10,6 +10,8 @@ namespace {
 constexpr double kFocal = 0.05, kAspect = 5e-3;  // relative; of the ratio of both focal lengths
 constexpr double kCentre = 0.03;                 // of the image's width
 constexpr double kRadial = 0.1, kTangential = 2e-3;
+// k2 of radial-tangential lenses has the other sign: so much of k1, and so far from that.
+constexpr double kSecondOfFirst = -0.35, kSecond = 0.04;
 constexpr double kRotation_rad = 2 * M_PI / 180, kTranslation_m = 0.03, kTime_s = 0.01;
 
 // k1 and k2 that show an equidistant lens out to 39 deg from the axis: 1 sigma of all lenses, beside kRadial.
@@ -17,7 +19,9 @@ constexpr double kEquidistant[] = {-0.32, 0.12};
 
 std::vector<double> distortion_sigma(const CameraIntrinsics& camera) {
   std::vector<double> out(camera.distortion.size(), kRadial);
-  if (camera.distortion_model == "radtan") std::fill_n(out.begin() + 2, 2, kTangential);
+  if (camera.distortion_model != "radtan") return out;
+  out[1] = std::hypot(kSecondOfFirst * kRadial, kSecond);
+  std::fill_n(out.begin() + 2, 2, kTangential);
   return out;
 }
 
@@ -29,6 +33,8 @@ bool all_zero(const std::vector<double>& values) {
 
 CalibrationSigma data_sheet_sigma(const CalibrationSigma& stated, const CameraIntrinsics& camera) {
   CalibrationSigma out = stated;
+  const bool tied = !stated.distortion && camera.distortion_model == "radtan";
+  if (!out.distortion) out.distortion = distortion_sigma(camera);
   if (!out.intrinsics) {
     out.intrinsics = {kFocal * camera.fx, kFocal * camera.fy, kCentre * camera.size.width,
                       kCentre * camera.size.width};
@@ -36,9 +42,9 @@ CalibrationSigma data_sheet_sigma(const CalibrationSigma& stated, const CameraIn
     Eigen::MatrixXd R = Eigen::MatrixXd::Identity(n + 7, n + 7);
     // Both focal lengths are one, but for the pixels' aspect: its variance is 2 (1 - r) kFocal^2.
     R(0, 1) = R(1, 0) = 1 - 0.5 * std::pow(kAspect / kFocal, 2);
+    if (tied) R(4, 5) = R(5, 4) = kSecondOfFirst * kRadial / (*out.distortion)[1];
     if (!out.correlation) out.correlation = R;
   }
-  if (!out.distortion) out.distortion = distortion_sigma(camera);
   if (!out.rotation_rad) out.rotation_rad = Eigen::Vector3d::Constant(kRotation_rad);
   if (!out.translation_m) out.translation_m = Eigen::Vector3d::Constant(kTranslation_m);
   if (!out.time_s) out.time_s = kTime_s;

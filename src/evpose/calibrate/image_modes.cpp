@@ -3,6 +3,7 @@
 
 #include <Eigen/QR>
 #include <cmath>
+#include <utility>
 
 namespace evpose {
 
@@ -26,7 +27,7 @@ ImageModes image_modes(const CameraIntrinsics& camera, Eigen::Index n) {
 
 Eigen::MatrixXd covariance_of_found(const ImageModes& modes, const CameraIntrinsics& camera,
                                     const CalibrationSigma& given, const Eigen::Quaterniond& R_body_cam,
-                                    double sigma_px) {
+                                    const ImageSigma& image) {
   const Eigen::VectorXd sigma = given.of_intrinsics(camera);
   const Eigen::Index n = sigma.size();
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n + 7, n + 7);
@@ -36,8 +37,13 @@ Eigen::MatrixXd covariance_of_found(const ImageModes& modes, const CameraIntrins
     off.head(n) = mode.head(n);
     return off;
   };
-  for (const Eigen::VectorXd* mode : {&modes.focal, &modes.cx, &modes.cy, &modes.cubic, &modes.quintic})
-    if (mode->size() > 0) add(sigma_px * numbers(*mode));
+  const std::pair<const Eigen::VectorXd&, double> known[] = {{modes.focal, image.focal_px},
+                                                             {modes.cx, image.centre_px},
+                                                             {modes.cy, image.centre_px},
+                                                             {modes.cubic, image.cubic_px},
+                                                             {modes.quintic, image.quintic_px}};
+  for (const auto& [mode, sigma_px] : known)
+    if (mode.size() > 0) add(sigma_px * numbers(mode));
   for (Eigen::Index i = 4; i < n; ++i)
     if (out(i, i) == 0) out(i, i) = sigma(i) * sigma(i);
   // Of fx / fy, by what was given.

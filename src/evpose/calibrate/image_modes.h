@@ -21,11 +21,16 @@ struct ImageModes {
 };
 ImageModes image_modes(const CameraIntrinsics& camera, Eigen::Index n);
 
-/// Once the image is known to `sigma_px` in each of the modes but roll, at the given mounting R_body_cam: how
-/// far the numbers may be off, in the order of CalibrationSigma::correlation, squares of px, rad, m and s. A
-/// turn of the camera goes with the principal point that makes up for it. What no mode has is as given.
+/// 1 sigma of an image in each of the modes but roll, px.
+struct ImageSigma {
+  double centre_px, focal_px, cubic_px, quintic_px;
+};
+
+/// Once the image is known so well, at the given mounting R_body_cam: how far the numbers may be off, in the
+/// order of CalibrationSigma::correlation, squares of px, rad, m and s. A turn of the camera goes with the
+/// principal point that makes up for it. What no mode has is as given.
 Eigen::MatrixXd covariance_of_found(const ImageModes& modes, const CameraIntrinsics& camera,
                                     const CalibrationSigma& given, const Eigen::Quaterniond& R_body_cam,
-                                    double sigma_px);
+                                    const ImageSigma& image);
 
 }  // namespace evpose

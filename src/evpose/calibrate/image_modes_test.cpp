@@ -58,7 +58,8 @@ TEST(ImageModes, CovarianceOfFoundAllowsAllOfTheDataSheetButKeepsTheImage) {
   const CalibrationSigma given = data_sheet_sigma({}, camera());
   const Eigen::Quaterniond R_body_cam(so3::exp({1.2, -1.1, 0.9}));
   constexpr double kSigma_px = 2;
-  Eigen::MatrixXd C = covariance_of_found(image_modes(camera(), 8), camera(), given, R_body_cam, kSigma_px);
+  Eigen::MatrixXd C = covariance_of_found(image_modes(camera(), 8), camera(), given, R_body_cam,
+                                          {kSigma_px, kSigma_px, kSigma_px, kSigma_px});
   ASSERT_EQ(C.rows(), 15);
   EXPECT_LE(std::sqrt(C(8, 8)), given.of_rotation_rad().x());
   EXPECT_GT(std::sqrt(C(8, 8)), 0.7 * given.of_rotation_rad().x());

@@ -12,10 +12,11 @@ import tables
 
 FAR = {"focal": 0.05, "centre_px": 20}  # of a start
 LONG_SCENARIO, LONG_S, LONG_SEED = "turning_2", 10, 230
-LONG_SIZES = {"640x480": "vga", "1280x720": "720p"}
+LONG_SIZES, BUILT_SIZES = {"640x480": "vga", "1280x720": "720p"}, ("640x480",)
 HEAD = ["recording", "focal %", "centre px", "image px rms", "rotation deg", "place mm", "time ms", "NEES", "largest error, sigma",
         "at rest"]
-DRAWN_SCENARIO, DRAWN_S, DRAWN, DRAWN_FROM = "turning_2", 4, 20, 200
+DRAWN_SCENARIO, DRAWN_S = "turning_2", 4
+DRAWN_SEEDS = [seed for seed in range(202, 224) if seed not in (204, 208)]  # these, 200 and 201 were looked at
 DRAWN_ROWS = {"focal_percent": "focal %", "centre_px": "centre px", "image_px": "image px rms", "rotation_deg": "rotation deg",
               "place_mm": "place mm", "time_ms": "time ms", "nees": "NEES", "worst_sigma": "largest error, sigma",
               "gyro_ideal": "gyroscope's axes, as if ideal, % rms", "gyro": "gyroscope's axes, found",
@@ -88,13 +89,14 @@ def found_of_built(bench, recording, seed):
 
 
 def long_flights(bench):
-    """Ten seconds of a place of their own, both sizes, before true contours and a built map."""
+    """Ten seconds of a place of their own, before true contours, and before a built map where that does not take an hour."""
     rows = []
     for size, words in LONG_SIZES.items():
         recording = bench.simulated(LONG_SCENARIO, LONG_S, [f"camera.size={words}", "lidar.on=true", *harness.seeds(LONG_SEED)],
                                     name=f"calibrate_{words}")
-        rows += [row(f"{size}, true contours", *found_of(bench, recording, LONG_SEED)),
-                 row(f"{size}, built map", *found_of_built(bench, recording, LONG_SEED))]
+        rows.append(row(f"{size}, true contours", *found_of(bench, recording, LONG_SEED)))
+        if size in BUILT_SIZES:
+            rows.append(row(f"{size}, built map", *found_of_built(bench, recording, LONG_SEED)))
     return tables.table(HEAD, [*rows, GOAL])
 
 
@@ -106,7 +108,7 @@ def measured(bench, recordings, first_seed):
 def drawn(bench):
     """Flights of their own seeds: distributions of errors, and of how they compare with what is stated."""
     all_errors, refused, restless = [], 0, 0
-    for seed in range(DRAWN_FROM, DRAWN_FROM + (1 if bench.quick else DRAWN)):
+    for seed in DRAWN_SEEDS[:1] if bench.quick else DRAWN_SEEDS:
         recording = bench.simulated(DRAWN_SCENARIO, DRAWN_S, [*harness.TINY, *harness.seeds(seed)], name=f"calibrate_{seed}")
         found, true = found_of(bench, recording, seed)
         if "failed" in found:

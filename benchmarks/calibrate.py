@@ -12,7 +12,7 @@ import tables
 
 FAR = {"focal": 0.05, "centre_px": 20}  # of a start
 LONG_SCENARIO, LONG_S, LONG_SEED = "turning_2", 10, 230
-LONG_SIZES, BUILT_SIZES = {"640x480": "vga", "1280x720": "720p"}, ("640x480",)
+LONG_SIZES = {"640x480": "vga"}  # 1280x720: more than 17 minutes of processor time for each map
 HEAD = ["recording", "focal %", "centre px", "image px rms", "rotation deg", "place mm", "time ms", "NEES", "largest error, sigma",
         "at rest"]
 DRAWN_SCENARIO, DRAWN_S = "turning_2", 4
@@ -89,14 +89,13 @@ def found_of_built(bench, recording, seed):
 
 
 def long_flights(bench):
-    """Ten seconds of a place of their own, before true contours, and before a built map where that does not take an hour."""
+    """Ten seconds of a place of their own, before true contours and a built map."""
     rows = []
     for size, words in LONG_SIZES.items():
         recording = bench.simulated(LONG_SCENARIO, LONG_S, [f"camera.size={words}", "lidar.on=true", *harness.seeds(LONG_SEED)],
                                     name=f"calibrate_{words}")
-        rows.append(row(f"{size}, true contours", *found_of(bench, recording, LONG_SEED)))
-        if size in BUILT_SIZES:
-            rows.append(row(f"{size}, built map", *found_of_built(bench, recording, LONG_SEED)))
+        rows += [row(f"{size}, true contours", *found_of(bench, recording, LONG_SEED)),
+                 row(f"{size}, built map", *found_of_built(bench, recording, LONG_SEED))]
     return tables.table(HEAD, [*rows, GOAL])
 
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/calibrate/coarse_camera.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -191,7 +192,8 @@ struct Unknowns {
     const Eigen::Index n = given.intrinsics.size();
     const Eigen::MatrixXd R = job.setup.calibration_sigma->of_correlation(*job.setup.intrinsics);
     const Eigen::VectorXd sigma = given.intrinsics_sigma.cwiseMax(kKnown);
-    information = (sigma.asDiagonal() * R.topLeftCorner(n, n) * sigma.asDiagonal()).inverse();
+    const Eigen::MatrixXd P = sigma.asDiagonal() * R.topLeftCorner(n, n) * sigma.asDiagonal();
+    information = P.completeOrthogonalDecomposition().pseudoInverse();
     reach.resize(n + 1);
     reach << kReach * given.intrinsics_sigma,
         kReach * std::max(kRollSigma_rad, given.turn_sigma_rad.maxCoeff());
@@ -214,7 +216,7 @@ struct Unknowns {
     CalibrationSigma stated = *job.setup.calibration_sigma;
     if (!job.recording.has_imu) stated.rotation_rad = Eigen::Vector3d::Zero();  // the pose is the camera's
     const Eigen::MatrixXd C = covariance_of_found(modes, *job.setup.intrinsics, stated, T_body_cam.q, kSigma);
-    const Eigen::VectorXd sigma = C.diagonal().cwiseSqrt();
+    const Eigen::VectorXd sigma = C.diagonal().cwiseMax(0).cwiseSqrt();
     c.intrinsics_sigma = sigma.head(n);
     const Eigen::VectorXd weight = (sigma.array() > 0).select(sigma.cwiseInverse(), 0);
     found->correlation = weight.asDiagonal() * C * weight.asDiagonal();

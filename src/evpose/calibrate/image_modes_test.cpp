@@ -86,5 +86,15 @@ TEST(ImageModes, CovarianceOfFoundAllowsAllOfTheDataSheetButKeepsTheImage) {
   EXPECT_GT(std::sqrt(apart), 3 * kSigma_px);
 }
 
+TEST(ImageModes, WhatIsKnownStaysKnown) {
+  CalibrationSigma given = data_sheet_sigma({}, camera());
+  given.distortion = std::vector<double>{0, 0, 0, 0};
+  const Eigen::MatrixXd C = covariance_of_found(image_modes(camera(), 8), camera(), given,
+                                                Eigen::Quaterniond::Identity(), {1, 1, 1, 1});
+  EXPECT_TRUE(C.allFinite());
+  EXPECT_LT(C.diagonal().segment<4>(4).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_LE(std::sqrt(C(0, 0)), 2.0) << "a focal length that moves the corner by a pixel";
+}
+
 }  // namespace
 }  // namespace evpose

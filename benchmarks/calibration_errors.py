@@ -28,8 +28,8 @@ def read(path):
 
 
 def write(path, chain):
-    """Without sigmas: those of a data sheet hold."""
-    cam = {"camera_model": "pinhole", "distortion_coeffs": [float(v) for v in chain["distortion"]],
+    """Without `sigmas`, those of a data sheet hold."""
+    cam = {**chain.get("sigmas", {}), "camera_model": "pinhole", "distortion_coeffs": [float(v) for v in chain["distortion"]],
            "distortion_model": chain["model"], "intrinsics": [float(v) for v in chain["intrinsics"]],
            "resolution": list(chain["size"])}
     if "T_cam_imu" in chain:

@@ -24,7 +24,8 @@ constexpr double kBoardSigmas = 3;    // events are offset from a board's points
 constexpr double kBoardPlace_px = 1;  // pictures of events show a board ahead of or behind where it is
 constexpr double kBoardVelocity_m_s = 0.1, kBoardRate_rad_s = 0.1;  // mean over 0.2 s
 constexpr double kBoardGravity_rad = 0.02;
-constexpr double kRefuted = 5;  // given sigmas by which the events may contradict what was given
+constexpr double kEnough_mev_s = 8;  // near contours: what more of them say is known from these
+constexpr double kRefuted = 5;       // given sigmas by which the events may contradict what was given
 
 bool is_known(const CalibrationSigma& sigma, const Recording& recording) {
   const bool mounting = sigma.of_rotation_rad().isZero(0) && sigma.of_translation_m().isZero(0);
@@ -42,6 +43,8 @@ Expected<TrackJob> job_of(const TrackRequest& request, const RunConfig& config, 
   if (!job) return job;
   // It looks for a pose as the given calibration would see it; the alignment of the start looks for both.
   job->config.tracker.relocalization.on = false;
+  double& most_mev_s = job->config.tracker.events.most_mev_s;
+  most_mev_s = most_mev_s > 0 ? std::min(most_mev_s, kEnough_mev_s) : kEnough_mev_s;
   Recording& recording = job->recording;
   recording.camera = with_distortion(recording.camera);
   const CalibrationSigma sigma = start_sigma(recording.calibration_sigma, recording.camera, board);

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "evpose/calibrate/binned_image.h"
 #include "evpose/calibrate/event_slices.h"
 #include "evpose/calibrate/image_modes.h"
 #include "evpose/camera/adjusted_camera.h"
@@ -33,15 +34,17 @@ Calibration given_calibration(const TrackJob& job) {
 
 namespace {
 
-constexpr double kBridged_px = 4;  // that the alignment of the start bridges: its first gate
-constexpr double kReach = 2.5;     // sigmas to each side
-constexpr double kStep_px = 8;     // of the coarse grid: the reach of a coarse edge
-constexpr std::size_t kKept = 10;  // of its cameras are refined
+constexpr double kBridged_px = 4;           // that the alignment of the start bridges: its first gate
+constexpr double kReach = 2.5;              // sigmas to each side
+constexpr double kStep_px = 8;              // of the coarse grid: the reach of a coarse edge
+constexpr int kWideImage_px = 800;          // from here on edges are found in cells of two by two pixels
+constexpr std::size_t kKept = 10;           // of its cameras are refined
+constexpr std::size_t kKeptOfBinned = 100;  // more of them fit where pixels are wide
 constexpr double kCoarseSteps_px[] = {8, 4}, kFineSteps_px[] = {6, 3, 1.5, 0.75};
 constexpr double kRollSigma_rad = 0.02;     // at least: that of a start pose
 constexpr int kMostSweeps = 20;             // at each step
 constexpr double kCorrelatedPoints = 10;    // so many points share one error
-constexpr ImageSigma kSigma{1, 1.5, 2, 3};  // of what is found: the corners show least
+constexpr ImageSigma kSigma{1, 1.5, 2, 3};  // of what is found, in cells of edges: the corners show least
 constexpr std::size_t kSlices = 6;
 constexpr TimeNs kApart = 50 * kNsPerMs;  // slices; the pose follows from the IMU
 constexpr std::size_t kLaterSlices = 16;  // over a whole trajectory
@@ -91,6 +94,15 @@ Expected<std::vector<Pose>> poses_at(const TrackJob& job, const FusionConfig& fu
   return out;
 }
 
+/// So many pixels along each axis are one where the search begins.
+int binning_of(const CameraIntrinsics& camera) { return camera.size.width > kWideImage_px ? 2 : 1; }
+
+/// How closely an image is looked at.
+struct Look {
+  EdgeSpread spread;
+  int binning = 1;  ///< so many pixels are one, along each axis
+};
+
 class Trials {
  public:
   /// Points so far outside of the given camera's image are tried, too. `information`: of the intrinsic
@@ -108,9 +120,10 @@ class Trials {
     config.stride_px = kStrideOfPoints_px;
     config.budget = kPoints;
     config.margin_px = margin_px_;
-    views_.push_back({EdgeField(camera_.size), T_map_body * T_body_cam_, {}});
+    views_.push_back({EdgeField(camera_.size), {}, T_map_body * T_body_cam_, {}});
     View& view = views_.back();
     view.field.build(events);
+    if (binning_ > 1) view.binned = binned_field(events);
     VisibleSet visible(index_, *job_.setup.camera, config);
     for (const std::uint32_t i : visible.choose(view.T_map_cam))
       view.points.push_back({job_.map->position(i), job_.map->points[i].tangent.cast<double>()});
@@ -118,17 +131,19 @@ class Trials {
   }
 
   std::size_t size() const { return views_.size(); }
+  int binning() const { return binning_; }  ///< of the camera
 
   /// Mean of the views', with the share of what is known of the numbers.
-  double score(const Trial& trial, EdgeSpread spread) const {
+  double score(const Trial& trial, Look look) const {
     const auto n = trial.size() - 1;
-    const auto camera = make_camera(corrected(camera_, trial.head(n)));
+    const auto camera = make_camera(binned(corrected(camera_, trial.head(n)), look.binning));
     const Pose rolled{so3::exp({0, 0, trial(n)}), Eigen::Vector3d::Zero()};
     constexpr double kNone = -1e9;
     if (!camera) return kNone;
     double out = 0;
     for (const View& v : views_)
-      out += score_pose({v.field, **camera, rolled, v.points}, v.T_map_cam, spread);
+      out += score_pose({look.binning > 1 ? *v.binned : v.field, **camera, rolled, v.points}, v.T_map_cam,
+                        look.spread);
     const double unlikely = 0.5 * trial.head(n).dot(information_ * trial.head(n));
     return out / static_cast<double>(views_.size()) - unlikely / std::max(1.0, evidence_);
   }
@@ -136,14 +151,22 @@ class Trials {
  private:
   struct View {
     EdgeField field;
+    std::optional<EdgeField> binned;  ///< of wide images
     Pose T_map_cam;
     std::vector<SearchPoint> points;
   };
+  EdgeField binned_field(std::span<const FilteredEvent> events) const {
+    EdgeField out(binned(camera_, binning_).size);
+    out.build(binned(events, binning_));
+    return out;
+  }
+
   const TrackJob& job_;
   const Pose T_body_cam_;
   const double margin_px_;
   Eigen::MatrixXd information_;
   const CameraIntrinsics& camera_;
+  const int binning_ = binning_of(camera_);
   ContourIndex index_;
   std::vector<View> views_;
   double evidence_ = 0;  ///< independent points
@@ -156,8 +179,9 @@ struct Scored {
 
 /// The best of a grid, that differ, best first.
 std::vector<Scored> best_of_grid(const Trials& trials, const ImageModes& modes, const Trial& reach) {
+  const double step_px = kStep_px * trials.binning();
   const auto count = [&](const Trial& mode, Eigen::Index number) {
-    return mode.size() == 0 ? 0 : static_cast<int>(std::ceil(reach(number) / (kStep_px * mode(number))));
+    return mode.size() == 0 ? 0 : static_cast<int>(std::ceil(reach(number) / (step_px * mode(number))));
   };
   const int focal_count = count(modes.focal, 0), cubic_count = count(modes.cubic, 4),
             centre_count = count(modes.cx, 2);
@@ -167,20 +191,21 @@ std::vector<Scored> best_of_grid(const Trials& trials, const ImageModes& modes, 
     for (int k = -cubic_count; k <= cubic_count; ++k)
       for (int x = -centre_count; x <= centre_count; ++x)
         for (int y = -centre_count; y <= centre_count; ++y) {
-          const Trial on_grid = kStep_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
+          const Trial on_grid = step_px * (f * modes.focal + k * cubic + x * modes.cx + y * modes.cy);
           const Trial trial = on_grid.cwiseMin(reach).cwiseMax(-reach);
-          all.push_back({trial, trials.score(trial, EdgeSpread::coarse)});
+          all.push_back({trial, trials.score(trial, {EdgeSpread::coarse, trials.binning()})});
         }
   std::ranges::stable_sort(all, std::greater(), &Scored::score);
   std::vector<Scored> out;
+  const std::size_t most = trials.binning() > 1 ? kKeptOfBinned : kKept;
   // Neighbours in the grid lie within one step in each number.
   const Eigen::VectorXd step =
-      1.5 * kStep_px * (modes.focal.cwiseAbs() + cubic.cwiseAbs() + modes.cx + modes.cy);
+      1.5 * step_px * (modes.focal.cwiseAbs() + cubic.cwiseAbs() + modes.cx + modes.cy);
   for (const Scored& t : all) {
     const auto near = [&](const Scored& kept) {
       return ((t.trial - kept.trial).cwiseAbs().array() <= step.array()).all();
     };
-    if (out.size() < kKept && std::ranges::none_of(out, near)) out.push_back(t);
+    if (out.size() < most && std::ranges::none_of(out, near)) out.push_back(t);
   }
   return out;
 }
@@ -215,7 +240,8 @@ struct Unknowns {
     c.turn_sigma_rad = given.turn_sigma_rad;
     CalibrationSigma stated = *job.setup.calibration_sigma;
     if (!job.recording.has_imu) stated.rotation_rad = Eigen::Vector3d::Zero();  // the pose is the camera's
-    const Eigen::MatrixXd C = covariance_of_found(modes, *job.setup.intrinsics, stated, T_body_cam.q, kSigma);
+    const ImageSigma image = binning_of(*job.setup.intrinsics) * kSigma;
+    const Eigen::MatrixXd C = covariance_of_found(modes, *job.setup.intrinsics, stated, T_body_cam.q, image);
     const Eigen::VectorXd sigma = C.diagonal().cwiseMax(0).cwiseSqrt();
     c.intrinsics_sigma = sigma.head(n);
     const Eigen::VectorXd weight = (sigma.array() > 0).select(sigma.cwiseInverse(), 0);
@@ -224,10 +250,11 @@ struct Unknowns {
   }
 };
 
-/// Along each mode to and fro as long as it gets better, in ever smaller steps.
-void refine(const Trials& trials, const Unknowns& unknowns, EdgeSpread spread,
-            std::span<const double> steps_px, Scored* best) {
-  const auto score = [&](const Trial& trial) { return trials.score(trial, spread); };
+/// Along each mode to and fro as long as it gets better, in ever smaller steps, of pixels as they are looked
+/// at.
+void refine(const Trials& trials, const Unknowns& unknowns, Look look, std::span<const double> steps_px,
+            Scored* best) {
+  const auto score = [&](const Trial& trial) { return trials.score(trial, look); };
   best->score = score(best->trial);
   for (const double step_px : steps_px)
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
@@ -235,7 +262,7 @@ void refine(const Trials& trials, const Unknowns& unknowns, EdgeSpread spread,
       for (const Eigen::VectorXd* mode : unknowns.modes.all())
         for (const double step : {step_px, -step_px}) {
           if (mode->size() == 0) continue;
-          const Trial trial = best->trial + step * *mode;
+          const Trial trial = best->trial + look.binning * step * *mode;
           if (unknowns.beyond(trial)) continue;
           if (const double here = score(trial); here > best->score) *best = {trial, here};
         }
@@ -244,8 +271,8 @@ void refine(const Trials& trials, const Unknowns& unknowns, EdgeSpread spread,
 }
 
 void refine(const Trials& trials, const Unknowns& unknowns, Scored* best) {
-  refine(trials, unknowns, EdgeSpread::coarse, kCoarseSteps_px, best);
-  refine(trials, unknowns, EdgeSpread::fine, kFineSteps_px, best);
+  refine(trials, unknowns, {EdgeSpread::coarse}, kCoarseSteps_px, best);
+  refine(trials, unknowns, {EdgeSpread::fine}, kFineSteps_px, best);
 }
 
 /// Slices of the first tenths of a second.
@@ -306,12 +333,14 @@ Expected<CoarseCamera> coarse_camera(const TrackJob& job, const FusionConfig& fu
   unknowns.modes.roll.resize(0);  // the start's pose and the mounting have more than one way to be off
   CoarseCamera out{unknowns.given, {}};
   if (uncertain_px(*job.setup.intrinsics, unknowns.given.intrinsics_sigma) < kBridged_px) return out;
-  Trials trials(job, job.setup.T_body_cam, 2 * kReach * kStep_px, unknowns.information);
+  const double margin_px = 2 * kReach * kStep_px * binning_of(*job.setup.intrinsics);
+  Trials trials(job, job.setup.T_body_cam, margin_px, unknowns.information);
   if (auto ok = add_slices(job, fusion, &trials); !ok) return ok.error();
   if (trials.size() == 0) return out;
   std::optional<Scored> best;
   for (Scored tried : best_of_grid(trials, unknowns.modes, unknowns.reach)) {
-    refine(trials, unknowns, EdgeSpread::fine, kFineSteps_px, &tried);
+    refine(trials, unknowns, {EdgeSpread::fine, trials.binning()}, kFineSteps_px, &tried);
+    if (trials.binning() > 1) refine(trials, unknowns, {EdgeSpread::fine}, kFineSteps_px, &tried);
     if (!best || tried.score > best->score) best = std::move(tried);
   }
   unknowns.take(best->trial, job, job.setup.T_body_cam, &out);

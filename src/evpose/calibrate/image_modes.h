@@ -24,6 +24,9 @@ ImageModes image_modes(const CameraIntrinsics& camera, Eigen::Index n);
 /// 1 sigma of an image in each of the modes but roll, px.
 struct ImageSigma {
   double centre_px, focal_px, cubic_px, quintic_px;
+  friend ImageSigma operator*(double k, const ImageSigma& s) {
+    return {k * s.centre_px, k * s.focal_px, k * s.cubic_px, k * s.quintic_px};
+  }
 };
 
 /// Once the image is known so well, at the given mounting R_body_cam: how far the numbers may be off, in the

@@ -31,6 +31,7 @@ void add_map_depth(CLI::App& map, std::function<int()>& run);
 void add_map_merge(CLI::App& map, std::function<int()>& run);
 void add_map_compare(CLI::App& map, std::function<int()>& run);
 void add_map_changes(CLI::App& map, std::function<int()>& run);
+void add_map_index(CLI::App& map, std::function<int()>& run);
 void add_map_learn(CLI::App& map, std::function<int()>& run);
 void add_convert(CLI::App& app, std::function<int()>& run);
 void add_info(CLI::App& app, std::function<int()>& run);

@@ -109,6 +109,7 @@ void add_map(CLI::App& app, std::function<int()>& run) {
   add_map_build(*map, run);
   add_map_board(*map, run);
   add_map_depth(*map, run);
+  add_map_index(*map, run);
   add_map_learn(*map, run);
   add_map_changes(*map, run);
   add_map_merge(*map, run);

@@ -270,7 +270,7 @@ Expected<int> serve(const ServeRequest& request) {
   if (const double speed = config->replay.speed; !live && speed != 1)
     log_warning(speed > 0 ? text("not real time: the recording is replayed at ", speed, " times its speed")
                           : std::string("not real time: the recording is replayed as fast as it is tracked"));
-  job->setup.places = std::make_shared<PlaceCache>();
+  if (!job->setup.places) job->setup.places = std::make_shared<PlaceCache>();
   auto maker = TrackerMaker::create(*job);
   if (!maker) return maker.error();
   const auto placement = read_map_placement(job->map->source);

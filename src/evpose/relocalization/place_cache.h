@@ -5,7 +5,9 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 
+#include "evpose/map/place_table.h"
 #include "evpose/relocalization/place_index.h"
 
 namespace evpose {
@@ -14,6 +16,10 @@ namespace evpose {
 /// that asks while another makes an index waits.
 class PlaceCache {
  public:
+  PlaceCache() = default;
+  /// With what a map file keeps, from which its index is made in a tenth of the time.
+  explicit PlaceCache(PlaceTable kept);
+
   /// Of places over the box at least, divided at least nearly as finely as its own would be.
   std::shared_ptr<const PlaceIndex> over(const ContourIndex& index, const VisibleSetConfig& config,
                                          const Eigen::AlignedBox3d& box);
@@ -25,6 +31,9 @@ class PlaceCache {
     Eigen::AlignedBox3d box;
     std::shared_ptr<const PlaceIndex> index;
   };
+  bool keeps(std::uint64_t map, const VisibleSetConfig& config, const Eigen::AlignedBox3d& box) const;
+
+  std::optional<PlaceTable> kept_;
   std::mutex mutex_;
   std::deque<Entry> entries_;
 };

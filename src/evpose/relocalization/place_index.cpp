@@ -2,6 +2,7 @@
 #include "evpose/relocalization/place_index.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "evpose/map/depth_buffer.h"
@@ -75,26 +76,49 @@ Eigen::AlignedBox3d space_around(const ContourMap& map) {
 /// Fills an index, place by place.
 class PlaceIndexBuilder {
  public:
-  PlaceIndexBuilder(const ContourIndex& index, const VisibleSetConfig& config, PlaceIndex& out)
+  /// `known`: of each place, if there is any; `told`: likewise.
+  PlaceIndexBuilder(const ContourIndex& index, const VisibleSetConfig& config, const PlaceTable* known,
+                    PlaceTable* told, PlaceIndex& out)
       : index_(index),
         config_(config),
+        known_(known),
+        told_(told),
         out_(out),
         depth_(make_depth(std::make_index_sequence<6>())),
         occlusion_(config.occlusion && !index.occluders().empty()),
+        listed_((index.map().points.size() + 63) / 64),
+        seen_of_(index.map().points.size()),
         sample_of_(index.map().points.size(), kNone) {}
 
-  void add_place(const Eigen::Vector3d& middle);
+  void add_all(const Eigen::AlignedBox3d& box);
 
  private:
+  struct Candidate {
+    std::uint32_t number;
+    Eigen::Vector3d ray;  ///< from the middle
+  };
+  void add_place(const Eigen::Vector3d& middle, std::size_t place);
+  void list_candidates(const Eigen::Vector3d& middle);
+  void look(const Eigen::Vector3d& middle, std::size_t place);
+  void tell(std::size_t count);
+  template <class Do>
+  void for_candidates_by_number(const Do& act);
   void draw_surfaces(const Eigen::Vector3d& middle);
   bool hidden(const Eigen::Vector3d& from_middle) const;
 
   const ContourIndex& index_;
   const VisibleSetConfig& config_;
+  const PlaceTable* known_;
+  PlaceTable* told_;
+  std::size_t known_bytes_ = 0;  ///< that the places before this one have
   PlaceIndex& out_;
   std::array<DepthBuffer, 6> depth_;  ///< to the sides of a cube
   bool occlusion_;
   std::vector<std::uint32_t> cubes_;
+  std::vector<Candidate> candidates_;  ///< of the place being made
+  std::vector<std::uint8_t> seen_;     ///< which of them are, a byte each
+  std::vector<std::uint64_t> listed_;  ///< a bit of each of the map's points, zero between uses
+  std::vector<std::uint8_t> seen_of_;  ///< of the map's points that are candidates
   std::array<std::vector<std::uint32_t>, PlaceIndex::kDirections> of_direction_;  ///< of the place being made
   std::vector<std::uint32_t> sample_of_;  ///< of the map's points, kNone: not used
 };
@@ -103,16 +127,36 @@ double PlaceIndex::edge_m_of(const Eigen::AlignedBox3d& box) {
   return std::max(kLeastEdge_m, std::cbrt(box.volume() / kMostPlaces));
 }
 
+Eigen::Vector3d PlaceIndex::counts_of(const Eigen::AlignedBox3d& box) {
+  return (box.sizes() / edge_m_of(box)).array().ceil().max(1);
+}
+
 PlaceIndex::PlaceIndex(const ContourIndex& index, const VisibleSetConfig& config,
-                       const Eigen::AlignedBox3d& box)
+                       const Eigen::AlignedBox3d& box, PlaceTable* told)
     : edge_m_(edge_m_of(box)), anchor_(index.map().anchor) {
+  if (told != nullptr)
+    *told = {view_fingerprint(index.map()), config.near_m, config.far_m, config.grazing_sin, box, {}, {}};
+  PlaceIndexBuilder(index, config, nullptr, told, *this).add_all(box);
+}
+
+PlaceIndex::PlaceIndex(const ContourIndex& index, const PlaceTable& table)
+    : edge_m_(edge_m_of(table.box)), anchor_(index.map().anchor) {
+  VisibleSetConfig config;
+  config.near_m = table.near_m;
+  config.far_m = table.far_m;
+  config.grazing_sin = table.grazing_sin;
+  PlaceIndexBuilder(index, config, &table, nullptr, *this).add_all(table.box);
+}
+
+void PlaceIndexBuilder::add_all(const Eigen::AlignedBox3d& box) {
   if (box.isEmpty()) return;
-  PlaceIndexBuilder builder(index, config, *this);
-  const Eigen::Vector3i counts = (box.sizes() / edge_m_).array().ceil().max(1).cast<int>();
-  const Eigen::Vector3d first = box.center() - 0.5 * edge_m_ * (counts.array() - 1).matrix().cast<double>();
+  const double edge_m = out_.edge_m_;
+  const Eigen::Vector3i counts = PlaceIndex::counts_of(box).cast<int>();
+  const Eigen::Vector3d first = box.center() - 0.5 * edge_m * (counts.array() - 1).matrix().cast<double>();
+  std::size_t place = 0;
   for (int x = 0; x < counts.x(); ++x)
     for (int y = 0; y < counts.y(); ++y)
-      for (int z = 0; z < counts.z(); ++z) builder.add_place(first + edge_m_ * Eigen::Vector3d(x, y, z));
+      for (int z = 0; z < counts.z(); ++z) add_place(first + edge_m * Eigen::Vector3d(x, y, z), place++);
 }
 
 void PlaceIndexBuilder::draw_surfaces(const Eigen::Vector3d& middle) {
@@ -135,11 +179,10 @@ bool PlaceIndexBuilder::hidden(const Eigen::Vector3d& from_middle) const {
   return depth_[static_cast<std::size_t>(s)].hides(side(s).transpose() * from_middle);
 }
 
-void PlaceIndexBuilder::add_place(const Eigen::Vector3d& middle) {
+/// Points that are seen there if nothing hides them.
+void PlaceIndexBuilder::list_candidates(const Eigen::Vector3d& middle) {
   const ContourMap& map = index_.map();
-  if (occlusion_) draw_surfaces(middle);
-  for (auto& seen : of_direction_) seen.clear();
-  std::size_t count = 0;
+  candidates_.clear();
   cubes_.clear();
   index_.append_cubes_within(middle, config_.far_m, cubes_);
   for (const std::uint32_t c : cubes_) {
@@ -160,24 +203,83 @@ void PlaceIndexBuilder::add_place(const Eigen::Vector3d& middle) {
       if (distance < kNearest_m || distance > config_.far_m) continue;
       const double sine = map.points[number].tangent.cast<double>().cross(ray).norm() / distance;
       if (sine < config_.grazing_sin || chance(number) > spacing * sine / (kSpacing_rad * distance)) continue;
-      if (occlusion_ && hidden(ray)) continue;
-      std::uint32_t& sample = sample_of_[number];
-      if (sample == kNone) {
-        sample = static_cast<std::uint32_t>(out_.samples_.size());
-        out_.samples_.push_back({map.points[number].position, map.points[number].tangent});
-      }
-      of_direction_[static_cast<std::size_t>(direction_of(ray))].push_back(sample);
-      ++count;
+      candidates_.push_back({number, ray});
     }
   }
+}
+
+/// Which of the candidates are seen. What is known counts if it is of as many: which points are listed may
+/// hang on the last bit of a distance.
+void PlaceIndexBuilder::look(const Eigen::Vector3d& middle, std::size_t place) {
+  const std::size_t count = candidates_.size();
+  seen_.assign(count, 1);
+  if (!occlusion_) return;
+  if (known_ != nullptr) {
+    const std::uint32_t looked_at = known_->looked_at[place];
+    const std::uint8_t* bits = known_->seen.data() + known_bytes_;
+    if (looked_at != PlaceTable::kNoPlace) known_bytes_ += (looked_at + 7) / 8;
+    if (looked_at == count) {
+      std::size_t i = 0;
+      for_candidates_by_number([&](std::uint32_t number) {
+        seen_of_[number] = bits[i / 8] >> (i % 8) & 1;
+        ++i;
+      });
+      for (i = 0; i < count; ++i) seen_[i] = seen_of_[candidates_[i].number];
+      return;
+    }
+  }
+  draw_surfaces(middle);
+  for (std::size_t i = 0; i < count; ++i) seen_[i] = hidden(candidates_[i].ray) ? 0 : 1;
+}
+
+/// In that order neighbours on a contour follow each other, and what is seen of them is told by few bytes.
+template <class Do>
+void PlaceIndexBuilder::for_candidates_by_number(const Do& act) {
+  for (const Candidate& c : candidates_) listed_[c.number / 64] |= std::uint64_t{1} << (c.number % 64);
+  for (std::size_t w = 0; w < listed_.size(); ++w)
+    for (; listed_[w] != 0; listed_[w] &= listed_[w] - 1)
+      act(static_cast<std::uint32_t>(64 * w + static_cast<std::size_t>(std::countr_zero(listed_[w]))));
+}
+
+void PlaceIndexBuilder::tell(std::size_t count) {
+  if (told_ == nullptr || !occlusion_) return;
+  if (count < kFewestPoints) return told_->looked_at.push_back(PlaceTable::kNoPlace);
+  told_->looked_at.push_back(static_cast<std::uint32_t>(seen_.size()));
+  for (std::size_t i = 0; i < seen_.size(); ++i) seen_of_[candidates_[i].number] = seen_[i];
+  std::size_t i = 0;
+  for_candidates_by_number([&](std::uint32_t number) {
+    if (i % 8 == 0) told_->seen.push_back(0);
+    told_->seen.back() |= static_cast<std::uint8_t>(seen_of_[number] << (i % 8));
+    ++i;
+  });
+}
+
+void PlaceIndexBuilder::add_place(const Eigen::Vector3d& middle, std::size_t place) {
+  if (known_ != nullptr && occlusion_ && known_->looked_at[place] == PlaceTable::kNoPlace) return;
+  const ContourMap& map = index_.map();
+  list_candidates(middle);
+  look(middle, place);
+  const auto count = static_cast<std::size_t>(std::ranges::count(seen_, 1));
+  tell(count);
   if (count < kFewestPoints) return;
-  PlaceIndex::Place place{middle, {}};
+  for (auto& seen : of_direction_) seen.clear();
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    if (seen_[i] == 0) continue;
+    const auto& [number, ray] = candidates_[i];
+    std::uint32_t& sample = sample_of_[number];
+    if (sample == kNone) {
+      sample = static_cast<std::uint32_t>(out_.samples_.size());
+      out_.samples_.push_back({map.points[number].position, map.points[number].tangent});
+    }
+    of_direction_[static_cast<std::size_t>(direction_of(ray))].push_back(sample);
+  }
+  PlaceIndex::Place made{middle, {}};
   for (std::size_t k = 0; k < PlaceIndex::kDirections; ++k) {
-    place.begins[k] = static_cast<std::uint32_t>(out_.points_.size());
+    made.begins[k] = static_cast<std::uint32_t>(out_.points_.size());
     out_.points_.insert(out_.points_.end(), of_direction_[k].begin(), of_direction_[k].end());
   }
-  place.begins[PlaceIndex::kDirections] = static_cast<std::uint32_t>(out_.points_.size());
-  out_.places_.push_back(place);
+  made.begins[PlaceIndex::kDirections] = static_cast<std::uint32_t>(out_.points_.size());
+  out_.places_.push_back(made);
 }
 
 std::vector<int> PlaceIndex::directions_around(const Eigen::Vector3d& axis, double angle_rad) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "evpose/map/contour_index.h"
+#include "evpose/map/place_table.h"
 #include "evpose/map/visible_set.h"
 
 namespace evpose {
@@ -23,10 +24,16 @@ class PlaceIndex {
     std::array<std::uint32_t, kDirections + 1> begins;  ///< of the directions' ranges
   };
 
-  /// Places over a box of the map frame.
-  PlaceIndex(const ContourIndex& index, const VisibleSetConfig& config, const Eigen::AlignedBox3d& box);
+  /// Places over a box of the map frame. `told`, if any, is told what is hidden.
+  PlaceIndex(const ContourIndex& index, const VisibleSetConfig& config, const Eigen::AlignedBox3d& box,
+             PlaceTable* told = nullptr);
+  /// The same as the one that told the table, of that map; the table has as many places as counts_of() its
+  /// box.
+  PlaceIndex(const ContourIndex& index, const PlaceTable& table);
   /// Edge of a place, of an index over such a box.
   static double edge_m_of(const Eigen::AlignedBox3d& box);
+  /// Numbers of places along x, y and z, those that see hardly anything among them.
+  static Eigen::Vector3d counts_of(const Eigen::AlignedBox3d& box);
 
   std::span<const Place> places() const { return places_; }
   /// A point of a contour.

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/run/track_recording.h"
 
-#include <sys/resource.h>
-
 #include <Eigen/Core>
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 
@@ -19,6 +16,7 @@
 #include "evpose/io/motion/imu_units.h"
 #include "evpose/io/recording/recording.h"
 #include "evpose/report/overlay.h"
+#include "evpose/run/kept_places.h"
 #include "evpose/run/open_map.h"
 #include "evpose/run/plausibility.h"
 #include "evpose/run/presets.h"
@@ -109,25 +107,6 @@ Expected<std::shared_ptr<const ContourMap>> load_map(const TrackRequest& request
   return std::make_shared<const ContourMap>(std::move(*map));
 }
 
-double wall_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double cpu_s() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-double peak_memory_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;
-}
-
 void describe(ConfigTable& table, RunConfig& c) {
   describe(table, c.tracker);
   table.add("packet_ms", c.packet_ms, "ms", "length of the packets in which events are read", {1e-3, 1e5});
@@ -212,6 +191,11 @@ Expected<TrackJob> make_job(const TrackRequest& request, const RunConfig& config
                map->parts,
                start->T_map_body.p,
                recording.frame_camera};
+  if (request.occluders.empty() && !map->parts) {
+    auto places = kept_places(*path, *map->map, job.findings);
+    if (!places) return places.error();
+    job.setup.places = *std::move(places);
+  }
   job.start_words = start_words(request.init, !job.truth.empty());
   for (const auto& doubt : {doubt_map_size(*map->map), doubt_start_place(*map->map, start->T_map_body)})
     if (doubt) job.findings.push_back(*doubt);

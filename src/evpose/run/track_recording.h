@@ -10,6 +10,7 @@
 #include "evpose/core/error.h"
 #include "evpose/io/recording/recording.h"
 #include "evpose/report/run_folder.h"
+#include "evpose/run/resources.h"
 #include "evpose/tracker/tracker.h"
 
 namespace evpose {
@@ -74,10 +75,6 @@ std::optional<RunCalibration> run_calibration(const TrackJob& job, const Calibra
 /// What the run folder is told at the end; without times and memory. `found`: of the calibration.
 RunSummary summarise(const TrackJob& job, const TrackRequest& request, const Tracker& tracker,
                      const Calibration& found);
-
-double wall_s();          ///< on a monotone clock
-double cpu_s();           ///< processor time of the program
-double peak_memory_mb();  ///< of the program
 
 /// The main job: recording and map in, run folder out. Nothing is written on error. A run that is interrupted
 /// is complete up to there.

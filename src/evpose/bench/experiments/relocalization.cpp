@@ -259,14 +259,16 @@ void print_wrong(const std::string& name, const Streams& streams, const std::vec
   }
 }
 
-bool is_wanted(const StartClass& from, const RelocalizationRequest& request) {
-  const auto begins = [&](const std::string& name) { return std::string(from.name).starts_with(name); };
+constexpr char kWrong[] = "wrong";  // among the classes: what cannot be tracked
+
+bool is_wanted(const std::string& what, const RelocalizationRequest& request) {
+  const auto begins = [&](const std::string& name) { return what.starts_with(name); };
   return request.classes.empty() || std::any_of(request.classes.begin(), request.classes.end(), begins);
 }
 
 void print_starts(const std::string& name, const Streams& streams, const RelocalizationRequest& request) {
   for (const StartClass& from : kClasses)
-    if (is_wanted(from, request)) print_row(name, from, start_all(streams, from, request));
+    if (is_wanted(from.name, request)) print_row(name, from, start_all(streams, from, request));
 }
 
 }  // namespace
@@ -286,15 +288,16 @@ Status print_relocalization(const RelocalizationRequest& request) {
     }
     all.push_back(std::move(*streams));
   }
-  std::printf(
-      "%d starts each, anywhere in the recording, velocity unknown%s. Locked: within %.0f mm after %.1f "
-      "s.\n\n"
-      "| recording | start off by | locked | wrong called tracking | wrong called degraded | not found | "
-      "median s to lock | median error mm | search ms p50 | p95 "
-      "|\n|---|---|---|---|---|---|---|---|---|---|\n",
-      request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);
+  if (std::ranges::any_of(kClasses, [&](const StartClass& c) { return is_wanted(c.name, request); }))
+    std::printf(
+        "%d starts each, anywhere in the recording, velocity unknown%s. Locked: within %.0f mm after %.1f "
+        "s.\n\n"
+        "| recording | start off by | locked | wrong called tracking | wrong called degraded | not found | "
+        "median s to lock | median error mm | search ms p50 | p95 "
+        "|\n|---|---|---|---|---|---|---|---|---|---|\n",
+        request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);
   for (std::size_t i = 0; i < all.size(); ++i) print_starts((*recordings)[i].name, all[i], request);
-  if (!request.classes.empty()) return {};
+  if (!is_wanted(kWrong, request)) return {};
   std::printf(
       "\n%d starts each from the true pose, watched for %.1f s, with what cannot be tracked.\n\n"
       "| recording | what is wrong | starts ever called tracking | %% of updates called tracking | %% of "

@@ -12,6 +12,7 @@
 #include "evpose/io/hdf5/hdf5_file.h"
 #include "evpose/io/maps/contour_files.h"
 #include "evpose/io/maps/map_h5.h"
+#include "evpose/io/maps/map_places.h"
 #include "evpose/io/maps/ply.h"
 
 namespace evpose {
@@ -247,6 +248,38 @@ TEST(MapH5, WhereAMapLiesInTheWorldIsKept) {
   EXPECT_TRUE(says(error_line(read_map_placement(folder / "off.h5")), {"off.h5", "origin_llh"}));
   const auto no_map = read_map_placement(folder.file("points.ply", "ply\n"));
   EXPECT_TRUE(no_map.ok() && !no_map->T_ned_map);
+}
+
+TEST(MapH5, WhatIsSeenFromPlacesIsKept) {
+  const TemporaryFolder folder;
+  const ContourMap map = in_file_order(small_map());
+  PlaceTable places{view_fingerprint(map),
+                    0.1,
+                    40,
+                    0.17,
+                    {Eigen::Vector3d(0, 1, 2), Eigen::Vector3d(3, 4, 5)},
+                    {9, PlaceTable::kNoPlace, 8},
+                    {0xA5, 1, 0x3C}};
+  ASSERT_TRUE(write_map_h5(folder / "map.h5", map, "", {}, &places).ok());
+  const auto again = read_map_h5(folder / "map.h5");
+  ASSERT_TRUE(again.ok()) << error_line(again);
+  EXPECT_EQ(view_fingerprint(*again), places.view);
+  const auto read = read_map_places(folder / "map.h5");
+  ASSERT_TRUE(read.ok() && *read) << error_line(read);
+  EXPECT_EQ((*read)->view, places.view);
+  EXPECT_EQ((*read)->near_m, places.near_m);
+  EXPECT_EQ((*read)->far_m, places.far_m);
+  EXPECT_EQ((*read)->grazing_sin, places.grazing_sin);
+  EXPECT_EQ((*read)->box.min(), places.box.min());
+  EXPECT_EQ((*read)->box.max(), places.box.max());
+  EXPECT_EQ((*read)->looked_at, places.looked_at);
+  EXPECT_EQ((*read)->seen, places.seen);
+  places.seen.pop_back();
+  ASSERT_TRUE(write_map_h5(folder / "short.h5", map, "", {}, &places).ok());
+  EXPECT_TRUE(says(error_line(read_map_places(folder / "short.h5")), {"short.h5", "/places", "2 bytes"}));
+  ASSERT_TRUE(write_map_h5(folder / "none.h5", map).ok());
+  const auto none = read_map_places(folder / "none.h5");
+  EXPECT_TRUE(none.ok() && !*none);
 }
 
 TEST(MapH5, SameMapSameBytes) {

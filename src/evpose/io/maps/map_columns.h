@@ -52,6 +52,9 @@ constexpr NumberType number_type<double>() {
   return NumberType::f64;
 }
 
+/// False, too, where it cannot be read.
+bool is_hdf5_file(const std::string& path);
+
 /// Reads datasets of a map file, whole and each against its checksum, or the rows of a page, which has one
 /// for all of them. Remembers the first failure, so that reads can be listed.
 class MapColumns {

@@ -283,27 +283,22 @@ Expected<ContourMap> read_map_h5(const std::string& path) {
   return map;
 }
 
-namespace {
-
-/// False, too, where it cannot be read.
-bool is_hdf5(const std::string& path) {
+bool is_hdf5_file(const std::string& path) {
   const auto opened = open_to_read(path);
   std::array<char, 4> head{};
   return opened && std::fread(head.data(), 1, head.size(), opened->stream.get()) == head.size() &&
          head == kHdf5Magic;
 }
 
-}  // namespace
-
 Expected<std::string> read_map_board(const std::string& path) {
-  if (!is_hdf5(path)) return std::string();
+  if (!is_hdf5_file(path)) return std::string();
   const auto file = Hdf5File::open(path);
   return file ? Expected(meta_text(*file, "board")) : file.error();
 }
 
 Expected<MapPlacement> read_map_placement(const std::string& path) {
   MapPlacement out;
-  if (open_to_read(path).ok() && !is_hdf5(path)) return out;
+  if (open_to_read(path).ok() && !is_hdf5_file(path)) return out;
   const auto file = Hdf5File::open(path);
   if (!file) return file.error();
   const auto T = file->attribute_numbers("/meta", "T_ned_map");

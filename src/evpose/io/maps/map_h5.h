@@ -7,6 +7,7 @@
 #include "evpose/core/error.h"
 #include "evpose/core/pose.h"
 #include "evpose/map/contour_map.h"
+#include "evpose/map/place_table.h"
 
 namespace evpose {
 
@@ -32,8 +33,12 @@ Expected<std::string> read_map_board(const std::string& path);
 
 /// Contours are numbered anew, in the order of their first points; points of one contour that differ in kind,
 /// planes or contrast become several. The mesh of occluders is written unless there are polygons to make it
-/// of. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes.
+/// of. `created_utc`: ISO 8601 with Z, or empty; part of the file's bytes. `places`: of the map
+/// in_file_order().
 Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc = "",
-                    const MapPlacement& placement = {});
+                    const MapPlacement& placement = {}, const PlaceTable* places = nullptr);
+
+/// The map with its points in the order that they have in a file.
+ContourMap in_file_order(ContourMap map);
 
 }  // namespace evpose

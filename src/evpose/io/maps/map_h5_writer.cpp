@@ -147,6 +147,7 @@ class Writer {
   Status polygons(const std::vector<MapPolygon>& polygons);
   Status mesh(const TriangleMesh& mesh);
   Status pages();
+  Status places(const PlaceTable& table);
   Status meta(const ContourMap& map, const std::string& created_utc, const MapPlacement& placement);
   Status close();
 
@@ -249,6 +250,18 @@ Status Writer::pages() {
   return done;
 }
 
+/// After the pages: the whole map's.
+Status Writer::places(const PlaceTable& table) {
+  const std::vector<double> view{table.near_m, table.far_m, table.grazing_sin};
+  const Eigen::Vector3d low = table.box.min(), high = table.box.max();
+  const std::vector<double> box{low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+  return first_failure(
+      {file_.make_group("/places"), dataset("/places/map", NumberType::u64, std::vector{table.view}),
+       dataset("/places/view", NumberType::f64, view), dataset("/places/box", NumberType::f64, box, 3),
+       dataset("/places/looked_at", NumberType::u32, table.looked_at),
+       dataset("/places/seen", NumberType::u8, table.seen)});
+}
+
 Status Writer::meta(const ContourMap& map, const std::string& created_utc, const MapPlacement& placement) {
   const std::uint32_t major = 1, minor = 0;
   std::array<double, 16> T_ned_map = kNedFromEnu;
@@ -292,8 +305,16 @@ Status Writer::close() {
 
 }  // namespace
 
+ContourMap in_file_order(ContourMap map) {
+  const std::vector<std::size_t> order = grouped(map);
+  std::vector<ContourPoint> points;
+  for (const std::size_t i : order) points.push_back(map.points[i]);
+  map.points = std::move(points);
+  return map;
+}
+
 Status write_map_h5(const std::string& path, const ContourMap& map, const std::string& created_utc,
-                    const MapPlacement& placement) {
+                    const MapPlacement& placement, const PlaceTable* places) {
   auto temporary = TemporaryFile::create(path);
   if (!temporary) return temporary.error();
   auto file = Hdf5File::create(*temporary);
@@ -303,6 +324,7 @@ Status write_map_h5(const std::string& path, const ContourMap& map, const std::s
   if (auto status =
           first_failure({writer.contours(columns), writer.planes(map.planes), writer.polygons(map.polygons),
                          map.polygons.empty() ? writer.mesh(map.occluders) : Status(), writer.pages(),
+                         places != nullptr ? writer.places(*places) : Status(),
                          writer.meta(map, created_utc, placement), writer.close()});
       !status)
     return status;

@@ -137,6 +137,25 @@ class MapBuildTest(unittest.TestCase):
         write_ply(cls.root / "cloud.ply", cls.points)
         cls.said = MapFileTest.run_evpose("map", "build", cls.root / "cloud.ply", "-o", cls.root / "map.h5").stdout
 
+    def test_an_index_tells_what_is_seen_from_places_the_same_each_time(self):
+        once, again = self.root / "indexed.h5", self.root / "again.h5"
+        said = MapFileTest.run_evpose("map", "index", self.root / "map.h5", "-o", once).stdout
+        MapFileTest.run_evpose("map", "index", once, "-o", again)
+        with h5py.File(once) as file, h5py.File(self.root / "map.h5") as plain, h5py.File(again) as second:
+            self.assertEqual(set(datasets(file)), set(datasets(second)))
+            self.assertLessEqual(set(datasets(plain)), set(datasets(file)))
+            for name, item in datasets(plain).items():
+                np.testing.assert_allclose(item[()], file[name][()], 1e-5, 1e-6, err_msg=name)
+            for name in file["places"]:
+                np.testing.assert_array_equal(file["places"][name][()], second["places"][name][()], name)
+            looked_at = file["places/looked_at"][:]
+            places = looked_at[looked_at != 2**32 - 1].astype(int)
+            self.assertRegex(said, f" {len(places)} places ")
+            self.assertEqual(len(file["places/seen"]), ((places + 7) // 8).sum())
+            low, high = file["places/box"][:]
+            xyz = file["meta"].attrs["anchor"] + file["points/xyz"][:].astype(float)
+            self.assertTrue((low < xyz.min(axis=0)).all() and (high > xyz.max(axis=0)).all())
+
     def refused(self, path, *says):
         result = MapFileTest.run_evpose("-q", "map", "build", path, "-o", self.root / "none.h5", status=2)
         self.assertEqual(result.stderr.count("\n"), 1, result.stderr)

@@ -15,6 +15,8 @@ LONG_SCENARIO, LONG_S, LONG_SEED = "turning_2", 10, 230
 LONG_SIZES = {"640x480": "vga", "1280x720": "720p"}
 HEAD = ["recording", "focal %", "centre px", "image px rms", "rotation deg", "place mm", "time ms", "NEES", "largest error, sigma",
         "at rest"]
+TURN_DEG, TURN_S, TURN_SEED = (0, 60, -40, 30), 3, 301
+STAR = "data/real/davis240c_rotating_star"
 DRAWN_SCENARIO, DRAWN_S = "turning_2", 4
 DRAWN_SEEDS = [seed for seed in range(202, 224) if seed not in (204, 208)]  # these, 200 and 201 were looked at
 DRAWN_ROWS = {"focal_percent": "focal %", "centre_px": "centre px", "image_px": "image px rms", "rotation_deg": "rotation deg",
@@ -117,6 +119,31 @@ def long_flights(bench):
     return tables.table(HEAD, [*rows, GOAL])
 
 
+def turned(bench):
+    """A camera that turns to and fro about the vertical and goes nowhere, from a far start."""
+    path = bench.scratch / "turn.txt"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("".join(f"4 3 1.5 {yaw_deg}\n" for yaw_deg in TURN_DEG))
+    settings = ["trajectory.kind=waypoints", f"trajectory.file={path}", *harness.TINY, *harness.seeds(TURN_SEED)]
+    recording = bench.simulated(LONG_SCENARIO, TURN_S, settings, name="calibrate_turn")
+    found, true = found_of(bench, recording, TURN_SEED)
+    return [*tables.table(HEAD, [row(f"a turn, {TURN_S} s", found, true)]), "", *told_words(found)]
+
+
+def star(bench):
+    """What is said of a real camera that rolls before a star."""
+    folder = bench.shared / STAR
+    gravity = (folder / "gravity.txt").read_text().split()[-3:]
+    known = [w for axis, value in zip("xyz", gravity) for w in ("--set", f"fusion.gravity_{axis}={value}")]
+    found = bench.once("calibrate: star", lambda: calibrated(bench, [folder], errors.read(folder / "camchain-imucam.yaml"), "--map",
+                                                             folder / "contours.ply", "--init", folder / "init.tum", *known))
+    return told_words(found)
+
+
+def told_words(found):
+    return ["refused: " + found["failed"]] if "failed" in found else [f"- {words}" for words in found["said"]]
+
+
 def measured(bench, recordings, first_seed):
     rows = [row(recording.name, *found_of(bench, recording, seed)) for seed, recording in enumerate(recordings, first_seed)]
     return tables.table(HEAD, [*rows, GOAL])
@@ -144,4 +171,5 @@ def drawn(bench):
 def make(bench):
     unseen = [] if bench.quick else bench.more_peers()
     return bench.write_page("calibrate", {"flights": measured(bench, bench.peers(), 0), "unseen": measured(bench, unseen, 100),
-                                          "long": long_flights(bench), "drawn": drawn(bench)})
+                                          "long": long_flights(bench), "turn": turned(bench), "star": star(bench),
+                                           "drawn": drawn(bench)})

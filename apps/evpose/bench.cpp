@@ -113,7 +113,8 @@ void add_relocalization(CLI::App& bench, Run& run) {
       ->capture_default_str();
   command
       ->add_option("--starts", request->classes,
-                   "how the names of the wanted starts begin, as GPS,anywhere; wrong: what cannot be tracked; default: all")
+                   "how the names of the wanted starts begin, as GPS,anywhere; wrong: what cannot be "
+                   "tracked; default: all")
       ->delimiter(',');
   command->add_flag("!--no-imu", request->imu, "leave the IMU out");
   command->callback(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 
 namespace evpose {
 namespace {
@@ -57,6 +58,12 @@ bool is_told(const CalibrationNumber& n) {
   return !(n.given_sigma > 0) || n.sigma < kNotTold * n.given_sigma;
 }
 
+std::string two_digits(double value) {
+  char out[32];
+  std::snprintf(out, sizeof out, "%.2g", value);
+  return out;
+}
+
 /// Which motion would tell a number.
 std::string remedy_of(const std::string& name, const FlightMotion& motion) {
   if (name == "fx" || name == "fy") return "move towards contours and away, or tilt the camera against them";
@@ -87,8 +94,9 @@ void add_untold(const CalibrationPage& page, std::vector<std::string>& out) {
                   out);
   for (const CalibrationNumber& n : page.numbers)
     if (!is_told(n))
-      out.push_back(text("the motion does not tell ", n.name, ": it is known to ", n.sigma, " ", n.unit,
-                         ", before to ", n.given_sigma, "; ", remedy_of(n.name, page.flights.front())));
+      out.push_back(text("the motion does not tell ", n.name, ": it is known to ", two_digits(n.sigma),
+                         n.unit.empty() ? "" : " ", n.unit, ", before to ", two_digits(n.given_sigma), "; ",
+                         remedy_of(n.name, page.flights.front())));
 }
 
 void add_correlations(const CalibrationPage& page, std::vector<std::string>& out) {

@@ -150,7 +150,7 @@ std::vector<StartOutcome> start_all(const Streams& streams, const StartClass& fr
 double percentile(std::vector<double> v, double share) {
   if (v.empty()) return std::nan("");
   std::sort(v.begin(), v.end());
-  return v[static_cast<std::size_t>(share * static_cast<double>(v.size() - 1) + 0.5)];
+  return v[static_cast<std::size_t>(std::lround(share * static_cast<double>(v.size() - 1)))];
 }
 
 void print_row(const std::string& name, const StartClass& from, const std::vector<StartOutcome>& outcomes) {

@@ -79,7 +79,8 @@ def calibrated(bench, folders, start, *words):
 
 def row(name, found, true):
     if "failed" in found:
-        return [name, "refused: " + found["failed"].split(": ", 2)[-1][:100], *["-"] * (len(HEAD) - 2)]
+        why = re.sub(r"\S*/", "", found["failed"].split(": ", 2)[-1]).split(";")[0]  # without folders and what to do
+        return [name, "refused: " + why, *["-"] * (len(HEAD) - 2)]
     e = errors.judge(errors.parse(found["chain"]), true)
     rests = not any("come to rest" in words for words in found["said"])
     return [name, *(f"{e[key]:.2g}" for key in ("focal_percent", "centre_px", "image_px", "rotation_deg", "place_mm", "time_ms",
@@ -141,7 +142,7 @@ def star(bench):
 
 
 def told_words(found):
-    return ["refused: " + found["failed"]] if "failed" in found else [f"- {words}" for words in found["said"]]
+    return ["refused: " + found["failed"].split(": ", 2)[-1]] if "failed" in found else [f"- {words}" for words in found["said"]]
 
 
 def measured(bench, recordings, first_seed):

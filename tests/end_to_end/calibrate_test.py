@@ -76,6 +76,11 @@ class CalibrateTest(unittest.TestCase):
                               "--calibration", self.root / "found.yaml", "--imu-model", self.root / "found-imu.yaml", "-o",
                               self.root / "run")
         self.assertEqual(tracked.returncode, 0, tracked.stderr)
+        surely_off = re.sub(r"intrinsics: \[.*\]", f"intrinsics: [{1.02 * fx}, {1.02 * fy}, {cx}, {cy}]\n"
+                            f"  intrinsics_sigma: [{1e-3 * fx}, {1e-3 * fy}, 0.1, 0.1]", re.sub(r".*_sigma: .*\n", "", truth))
+        refuted = self.calibrate(flight, surely_off, "--occluders", flight / "mesh.ply", "--force")
+        self.assertIn("it was taken for a data sheet's", refuted.stdout, refuted.stderr)
+        self.assertLess(abs(numbers((self.root / "found.yaml").read_text(), "intrinsics")[0] / fx - 1), 0.005)
         again = self.calibrate(flight, start)
         self.assertEqual(again.returncode, 2)
         self.assertIn("found.yaml: exists", again.stderr)

@@ -405,6 +405,8 @@ SECTIONS = {
         Situation("Learning from more runs than flights", "map learn map.h5 flight -o new.h5 --run run run", 2, ["--run", "2 runs of 1", "one for each"]),
         Situation("Learning into no folder", "map learn map.h5 flight -o nowhere/new.h5", 2, ["nowhere/new.h5", "folder", "make it"]),
         Situation("Changes to a map that is not there", "map changes map.h5 nowhere.h5", 2, ["nowhere.h5"]),
+        Situation("A board that never comes into view", "calibrate flight --map board.h5 -o new.yaml", 2,
+                  ["flight", "board is never seen", "columns and rows", "--init"]),
         Situation("Index of a map that is not there", "map index nowhere.h5 -o new.h5", 2, ["nowhere.h5"]),
         Situation("Index of contours that nothing hides", "map index contours.ply -o new.h5", 2, ["contours.ply", "nothing hides", "--occluders"]),
     ],

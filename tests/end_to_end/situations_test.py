@@ -70,6 +70,7 @@ def make_flight(place):
     shutil.copy(place / "made/map_raw.ply", place / "cloud.ply")
     shutil.copy(place / "made/groundtruth.tum", place / "start.tum")
     made(place, "map", "import", "contours.ply", "--occluders", "made/mesh.ply", "-o", "map.h5")
+    made(place, "map", "board", "--checkerboard", "9x7", "--square", "0.08", "-o", "board.h5")
     for name in ("events.raw", "events.bag"):
         made(place, "convert", "flight/events.h5", name, "--offset", "0.001")  # bags hold no times before zero
     made(place, "map", "build", "cloud.ply", "--plan", "planned", "--set", "tile_points=10000")

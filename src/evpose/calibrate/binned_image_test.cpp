@@ -17,9 +17,8 @@ CameraIntrinsics camera(const std::string& model, std::vector<double> distortion
   return out;
 }
 
-// Pixels are squares about their centres: a place in the image keeps its distance to the corner of the image
-// at
-// (-0.5, -0.5), in pixels so many times as wide.
+// Pixels are squares about their centres: a place keeps its distance to the image's corner at (-0.5, -0.5),
+// in pixels so many times as wide.
 TEST(BinnedImage, ShowsEachPointWhereItsPixelGoes) {
   for (const CameraIntrinsics& given :
        {camera("radtan", {-0.1, 0.02, 5e-4, -3e-4}), camera("equidistant", {0.01, -0.02, 0.003, 0.001})})

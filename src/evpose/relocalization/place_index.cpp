@@ -217,7 +217,7 @@ void PlaceIndexBuilder::look(const Eigen::Vector3d& middle, std::size_t place) {
   if (known_ != nullptr) {
     const std::uint32_t looked_at = known_->looked_at[place];
     const std::uint8_t* bits = known_->seen.data() + known_bytes_;
-    if (looked_at != PlaceTable::kNoPlace) known_bytes_ += (looked_at + 7) / 8;
+    known_bytes_ += (std::size_t{looked_at} + 7) / 8;
     if (looked_at == count) {
       std::size_t i = 0;
       for_candidates_by_number([&](std::uint32_t number) {

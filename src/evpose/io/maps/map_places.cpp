@@ -7,6 +7,7 @@
 #include "evpose/io/maps/map_columns.h"
 
 namespace evpose {
+
 Expected<std::optional<PlaceTable>> read_map_places(const std::string& path) {
   if (!is_hdf5_file(path)) return std::optional<PlaceTable>();
   const auto file = Hdf5File::open(path);

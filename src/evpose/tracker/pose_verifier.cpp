@@ -22,6 +22,13 @@ constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while
 constexpr float kEnoughWay_px = 2;
 constexpr float kForgotten_px = 1e-2F;
 
+/// Which of `count` equal sectors of the half circle the line lies in that has this normal.
+std::uint8_t sector_of(const Eigen::Vector2d& normal, std::size_t count) {
+  const double turns = std::atan2(normal.y(), normal.x()) / M_PI;  // of the half circle
+  const double sector = std::floor((turns - std::floor(turns)) * static_cast<double>(count));
+  return static_cast<std::uint8_t>(std::min(static_cast<std::size_t>(sector), count - 1));
+}
+
 constexpr double kSigma = 2;  // by so much, and by chance, pieces have more events on them than beside
 
 // How much has to be seen, and of it.
@@ -31,7 +38,10 @@ constexpr double kConfirmedRatio = 2.3;
 constexpr double kConfirmedRatioUnhidden = 1.9;         // contours behind surfaces have no events, but count
 constexpr double kLeastShare = 0.04, kEnoughRatio = 4;  // a few contours that happen to fit do not confirm
 constexpr double kManyPieces = 30, kRatioOfMany = 2.5;  // whatever their share
-constexpr double kConfirmedShare = 0.2, kRatioOfShare = 1.4;  // where texture has events beside them
+constexpr double kConfirmedShare = 0.2, kRatioOfShare = 1.4;     // where texture has events beside them
+constexpr double kDirectionRatio = 1.7, kDirectionShare = 0.05;  // one of the two, of each direction
+constexpr double kDirectionRatioUnhidden = 1.4;
+constexpr double kFewestPiecesOfOne = 15, kFewestEventsOfOne = 60;  // of a direction that counts
 constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
 
 }  // namespace
@@ -39,6 +49,7 @@ constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
 PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides)
     : size_(size),
       confirmed_ratio_(map_hides ? kConfirmedRatio : kConfirmedRatioUnhidden),
+      direction_ratio_(map_hides ? kDirectionRatio : kDirectionRatioUnhidden),
       pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
       pieces_(pieces) {}
 
@@ -118,6 +129,7 @@ void PoseVerifier::look_at(const ContourSample& contour, double span_s) {
   if (piece.way_px == 0) seen_.push_back(contour.segment);
   piece.way_px += static_cast<float>(std::abs(contour.speed_px_s) * span_s) + 1e-6F;
   piece.on += on->events;
+  piece.direction = sector_of(contour.normal_px, kDirections);
   for (std::size_t k = 0; k < kDecoys; ++k)  // another contour's events say nothing of this one
     piece.beside[k] += beside[k].crossed ? sum / static_cast<float>(free) : beside[k].events;
 }
@@ -157,36 +169,52 @@ void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const Co
   verdict_ = judge();
 }
 
-PoseEvidence PoseVerifier::evidence() const {
+PoseVerifier::Counts& PoseVerifier::Counts::operator+=(const Counts& other) {
+  pieces += other.pieces, on += other.on, beside += other.beside;
+  explained += other.explained, by_chance += other.by_chance;
+  return *this;
+}
+
+double PoseVerifier::Counts::ratio() const { return on / std::max(beside, 1.0); }
+
+PoseVerifier::Counts PoseVerifier::count(const Piece& piece) {
   // Clearly more events here than `there`, which is known from so many places.
   const auto exceeds = [](double here, double there, double places) {
-    return here - there > kSigma * std::sqrt(here + there / places + 1);
+    return here - there > kSigma * std::sqrt(here + there / places + 1) ? 1.0 : 0.0;
   };
-  PoseEvidence out;
-  double on = 0, beside = 0, explained = 0, by_chance = 0;
+  const double sum = std::accumulate(piece.beside.begin(), piece.beside.end(), 0.0);
+  Counts out{1, piece.on, sum / kDecoys, exceeds(piece.on, sum / kDecoys, kDecoys), 0};
+  for (const double b : piece.beside) out.by_chance += exceeds(b, (sum - b) / (kDecoys - 1), kDecoys - 1);
+  out.by_chance /= kDecoys;
+  return out;
+}
+
+PoseEvidence PoseVerifier::evidence() const {
+  Counts all;
+  std::array<Counts, kDirections> sectors;
   for (const std::uint32_t i : seen_) {
-    const Piece& p = pieces_[i];
-    if (p.way_px < kLeastWay_px) continue;
-    const double sum = std::accumulate(p.beside.begin(), p.beside.end(), 0.0);
-    on += p.on;
-    beside += sum / kDecoys;
-    ++out.pieces;
-    explained += exceeds(p.on, sum / kDecoys, kDecoys) ? 1 : 0;
-    for (const double b : p.beside) by_chance += exceeds(b, (sum - b) / (kDecoys - 1), kDecoys - 1) ? 1 : 0;
+    if (pieces_[i].way_px < kLeastWay_px) continue;
+    const Counts counts = count(pieces_[i]);
+    all += counts, sectors[pieces_[i].direction] += counts;
   }
-  if (out.pieces < kFewestPieces || on + beside < kFewestEvents) return {};
-  out.explained = (explained - by_chance / kDecoys) / out.pieces;
-  out.ratio = on / std::max(beside, 1.0);
+  if (all.pieces < kFewestPieces || all.on + all.beside < kFewestEvents) return {};
+  PoseEvidence out{all.pieces, all.share(), all.ratio()};
+  for (std::size_t i = 0; i < kDirections; ++i) {
+    Counts one = sectors[i];  // with its neighbour: no direction lies at the border of all
+    one += sectors[(i + 1) % kDirections];
+    if (one.pieces < kFewestPiecesOfOne || one.on + one.beside < kFewestEventsOfOne) continue;
+    out.contested |= one.ratio() < direction_ratio_ && one.share() < kDirectionShare;
+  }
   return out;
 }
 
 PoseVerdict PoseVerifier::judge() const {
   const PoseEvidence e = evidence();
   if (e.pieces == 0) return PoseVerdict::open;
-  if ((e.ratio > confirmed_ratio_ && e.explained > kLeastShare) || e.ratio > kEnoughRatio ||
-      (e.ratio > kRatioOfMany && e.explained * e.pieces > kManyPieces) ||
-      (e.explained > kConfirmedShare && e.ratio > kRatioOfShare))
-    return PoseVerdict::confirmed;
+  const bool agrees = (e.ratio > confirmed_ratio_ && e.explained > kLeastShare) || e.ratio > kEnoughRatio ||
+                      (e.ratio > kRatioOfMany && e.explained * e.pieces > kManyPieces) ||
+                      (e.explained > kConfirmedShare && e.ratio > kRatioOfShare);
+  if (agrees && !e.contested) return PoseVerdict::confirmed;
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
 }
 

@@ -25,11 +25,13 @@ struct PoseEvidence {
   double pieces = 0;     ///< of contours, that have moved enough to show themselves
   double explained = 0;  ///< share of these with clearly more events on them than beside, less that by chance
   double ratio = 0;      ///< events on contours to those beside them
+  bool contested = false;  ///< contours of one direction in the image have hardly more than beside them
 };
 
 /// Tells a pose that the events confirm from one that only looks so: compares the events on the contours with
 /// those on the same contours moved aside in the image, piece by piece. A wrong pose that has been fitted to
-/// the events has some contours on edges of the image; most are where there is none.
+/// the events has some contours on edges of the image; most are where there is none. A map that is right but
+/// for what runs in one direction holds the pose in the others only, so each direction is judged by itself.
 class PoseVerifier {
  public:
   /// `pieces`: number of the map's contrast segments; `map_hides`: it has surfaces that hide contours.
@@ -55,7 +57,18 @@ class PoseVerifier {
     float way_px = 0;  ///< of the contour across itself
     float on = 0;      ///< events
     std::array<float, kDecoys> beside{};
+    std::uint8_t direction = 0;  ///< of the contour in the image, of kDirections
   };
+  /// Of some of the pieces.
+  struct Counts {
+    double pieces = 0, on = 0, beside = 0;
+    double explained = 0, by_chance = 0;  ///< pieces
+    Counts& operator+=(const Counts& other);
+    double ratio() const;
+    double share() const { return (explained - by_chance) / pieces; }
+  };
+  static constexpr std::size_t kDirections = 8;
+  static Counts count(const Piece& piece);
   void decay(double elapsed_s);
   struct Look {
     float events = 0;
@@ -70,6 +83,7 @@ class PoseVerifier {
 
   ImageSize size_;
   double confirmed_ratio_;            ///< of events on contours to those beside
+  double direction_ratio_;            ///< the same of each direction
   std::vector<std::uint8_t> pixels_;  ///< number of this update's events, kOnContour
   std::vector<std::uint32_t> patch_;  ///< pixels where a contour was, had it been moved aside
   std::vector<std::uint32_t> marked_;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "evpose/tracker/test_flight.h"
@@ -78,6 +79,14 @@ TEST_F(PoseVerifierLaws, AWrongPoseIsRefuted) {
   Vector6d off = Vector6d::Zero();
   off.head<3>() << 0.1, -0.15, 0.1;
   EXPECT_EQ(verdict(world_, off), PoseVerdict::refuted);
+}
+
+/// Only its contours along y are right: most events lie at these, which tell the height alone.
+TEST_F(PoseVerifierLaws, AMapThatIsWrongInOneDirectionIsNotConfirmed) {
+  ContourMap map = world_;
+  for (ContourPoint& p : map.points)
+    if (std::abs(p.tangent.y()) < 0.9F) p.position.y() += 0.23F;
+  EXPECT_EQ(verdict(map, Vector6d::Zero()), PoseVerdict::open);
 }
 
 TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {

@@ -37,6 +37,7 @@ constexpr double kFewestPieces = 20, kFewestEvents = 100;
 constexpr double kConfirmedRatio = 2.3;
 constexpr double kConfirmedRatioUnhidden = 1.9;         // contours behind surfaces have no events, but count
 constexpr double kLeastShare = 0.04, kEnoughRatio = 4;  // a few contours that happen to fit do not confirm
+constexpr double kFewestExplained = 10;                 // pieces, whatever their share
 constexpr double kManyPieces = 30, kRatioOfMany = 2.5;  // whatever their share
 constexpr double kConfirmedShare = 0.2, kRatioOfShare = 1.4;     // where texture has events beside them
 constexpr double kDirectionRatio = 1.7, kDirectionShare = 0.05;  // one of the two, of each direction
@@ -211,9 +212,11 @@ PoseEvidence PoseVerifier::evidence() const {
 PoseVerdict PoseVerifier::judge() const {
   const PoseEvidence e = evidence();
   if (e.pieces == 0) return PoseVerdict::open;
-  const bool agrees = (e.ratio > confirmed_ratio_ && e.explained > kLeastShare) || e.ratio > kEnoughRatio ||
-                      (e.ratio > kRatioOfMany && e.explained * e.pieces > kManyPieces) ||
-                      (e.explained > kConfirmedShare && e.ratio > kRatioOfShare);
+  const double explained = e.explained * e.pieces;
+  const bool agrees =
+      (e.ratio > confirmed_ratio_ && e.explained > kLeastShare && explained > kFewestExplained) ||
+      e.ratio > kEnoughRatio || (e.ratio > kRatioOfMany && explained > kManyPieces) ||
+      (e.ratio > kRatioOfShare && e.explained > kConfirmedShare && explained > kFewestExplained);
   if (agrees && !e.contested) return PoseVerdict::confirmed;
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
 }

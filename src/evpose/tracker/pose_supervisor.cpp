@@ -16,6 +16,8 @@ constexpr double kHopeless_s = 1;           // without a search
 constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
 constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
+constexpr const char* kOneDirection =
+    "not in this map, or far from the pose: contours of one direction lie where no events are";
 
 }  // namespace
 
@@ -54,6 +56,7 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
 void PoseSupervisor::take_verdict(double span_s) {
   const PoseVerdict verdict = verifier_.verdict();
   confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + span_s : 0;
+  contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
   if (verdict == PoseVerdict::confirmed) contradicted_s_ = 0;
   if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
   verified_ |= confirmed_s_ > (verifying() ? kFoundConfirmed_s : kConfirmed_s);
@@ -61,13 +64,16 @@ void PoseSupervisor::take_verdict(double span_s) {
 
 bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }
 
+/// Contours of each direction have had events at some time once it is verified; some may pass without.
+bool PoseSupervisor::is_contested() const { return !verified_ && contested_s_ > kContradicted_s; }
+
 bool PoseSupervisor::is_hopeless() const {
   return searching() ? relocalizer_.has_tried_all() : !config_.on && contradicted_s_ > kHopeless_s;
 }
 
 Matrix6d PoseSupervisor::doubt() const {
   Matrix6d out = Matrix6d::Zero();
-  if (!is_contradicted() && (verified_ || !verifying())) return out;
+  if (!is_contradicted() && !is_contested() && (verified_ || !verifying())) return out;
   out.diagonal().head<3>().setConstant(kDoubtPosition_m * kDoubtPosition_m);
   out.diagonal().tail<3>().setConstant(kDoubtRotation_rad * kDoubtRotation_rad);
   return out;
@@ -144,6 +150,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.fault = e.fault;
   evidence.verified = verified_;
   evidence.hopeless = is_hopeless();
+  if (is_contested()) evidence.contradicted = kOneDirection;
   if (is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
   const Health health = health_.judge(evidence, reason);
   astray_s_ = !e.frames_confirm && is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;

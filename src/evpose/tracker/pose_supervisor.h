@@ -77,8 +77,8 @@ class PoseSupervisor {
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
   }
-  /// What is to be added to the pose's covariance while events contradict the pose, or while one that was
-  /// found is not verified.
+  /// What is to be added to the pose's covariance while events contradict the pose, or while one is not
+  /// verified that was found or whose contours of one direction lie where no events are.
   Matrix6d doubt() const;
 
  private:
@@ -88,6 +88,7 @@ class PoseSupervisor {
   bool pose_is_unconfirmed(TimeNs t, const RegistrationResult& registration) const;
   void take_verdict(double span_s);
   bool is_contradicted() const;
+  bool is_contested() const;
   bool is_hopeless() const;
   bool is_astray(const RegistrationResult& registration, Health health) const;
   bool is_astray_for_long() const;
@@ -104,6 +105,7 @@ class PoseSupervisor {
   TimeNs verify_until_ = 0;    ///< a pose that was found is watched until then; 0: none
   double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map
   double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
+  double contested_s_ = 0;     ///< for how long in a row one direction's contours have had none
   double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it
   bool start_is_unsure_ = false;
   bool verified_ = false;  ///< the events have confirmed the pose since it was given or found

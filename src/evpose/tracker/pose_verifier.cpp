@@ -217,7 +217,7 @@ PoseVerdict PoseVerifier::judge() const {
       (e.ratio > confirmed_ratio_ && e.explained > kLeastShare && explained > kFewestExplained) ||
       e.ratio > kEnoughRatio || (e.ratio > kRatioOfMany && explained > kManyPieces) ||
       (e.ratio > kRatioOfShare && e.explained > kConfirmedShare && explained > kFewestExplained);
-  if (agrees && !e.contested) return PoseVerdict::confirmed;
+  if (agrees) return e.contested ? PoseVerdict::contested : PoseVerdict::confirmed;
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
 }
 

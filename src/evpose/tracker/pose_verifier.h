@@ -17,6 +17,7 @@ namespace evpose {
 enum class PoseVerdict : std::uint8_t {
   open,       ///< too little has been seen, or it could be either
   confirmed,  ///< the events gather at the contours far beyond chance
+  contested,  ///< they do, but for the contours of one direction in the image
   refuted,    ///< hardly more than chance and fitting put there
 };
 

@@ -82,11 +82,11 @@ TEST_F(PoseVerifierLaws, AWrongPoseIsRefuted) {
 }
 
 /// Only its contours along y are right: most events lie at these, which tell the height alone.
-TEST_F(PoseVerifierLaws, AMapThatIsWrongInOneDirectionIsNotConfirmed) {
+TEST_F(PoseVerifierLaws, AMapThatIsWrongInOneDirectionIsContested) {
   ContourMap map = world_;
   for (ContourPoint& p : map.points)
     if (std::abs(p.tangent.y()) < 0.9F) p.position.y() += 0.23F;
-  EXPECT_EQ(verdict(map, Vector6d::Zero()), PoseVerdict::open);
+  EXPECT_EQ(verdict(map, Vector6d::Zero()), PoseVerdict::contested);
 }
 
 TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {

@@ -184,12 +184,21 @@ PYBIND11_MODULE(evpose, m) {
           "6x6 of (translation in the map, rotation in the body), m^2, rad^2")
       .def_property_readonly(
           "health", [](const Update& u) { return std::string(to_string(u.health)); },
-          "waiting, initialising, tracking, degraded or lost")
+          "waiting, initialising, tracking, degraded, ambiguous or lost")
       .def_readonly("reason", &Update::reason, "of the health, where it changed")
+      .def_property_readonly(
+          "candidates",
+          [](const Update& u) {
+            std::vector<Eigen::Matrix4d> out;
+            for (const Pose& T : u.candidates) out.push_back(T.matrix());
+            return out;
+          },
+          "while ambiguous: 4x4 values that T_map_body may have, likeliest first")
       .def_readonly("points", &Update::points, "chosen map points")
       .def_readonly("points_matched", &Update::points_matched, "of these, with events near by");
   py::class_<PyTracker>(
-      m, "Tracker", "Events, IMU samples and frames in order of time in, poses out; ValueError says what is wrong")
+      m, "Tracker",
+      "Events, IMU samples and frames in order of time in, poses out; ValueError says what is wrong")
       .def(py::init<const fs::path&, const fs::path&, const Eigen::Matrix4d&, TimeNs, const Eigen::Vector3d&,
                     const fs::path&, const fs::path&, const std::map<std::string, py::object>&>(),
            "map"_a, "calibration"_a, "T_map_body"_a, "t_ns"_a, "velocity"_a = Eigen::Vector3d(0, 0, 0),
@@ -202,10 +211,12 @@ PYBIND11_MODULE(evpose, m) {
       .def("add_imu", &PyTracker::add_imu, "t_ns"_a, "samples"_a,
            "int64 ns of shape (n,); (n, 6): gyro rad/s, accel m/s^2; gives the updates that were made")
       .def("add_frame", &PyTracker::add_frame, "t_ns"_a, "grey"_a, "exposure_ns"_a = 0,
-           "int64 ns, middle of the exposure; uint8 of shape (height, width) through the event camera's pixels, before "
+           "int64 ns, middle of the exposure; uint8 of shape (height, width) through the event camera's "
+           "pixels, before "
            "the events after it; gives the updates that were made")
       .def("events_complete_until", &PyTracker::events_complete_until, "t_ns"_a,
-           "int64 ns: no event before it will come, so that updates up to it, by frames alone, need not wait for one; "
+           "int64 ns: no event before it will come, so that updates up to it, by frames alone, need not wait "
+           "for one; "
            "gives the updates that were made")
       .def_property_readonly("has_imu", &PyTracker::has_imu, "the calibration knows where the IMU sits");
   bind_recordings(m);

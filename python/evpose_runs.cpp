@@ -100,7 +100,8 @@ auto worked(TrackRequest request, auto&& work) {
 
 RunFiles track(const fs::path& recording, const fs::path& output, const fs::path& map,
                const fs::path& calibration, const fs::path& occluders, const std::string& init,
-               const std::pair<double, double>& init_sigma, const Settings& settings, bool replace, const fs::path& imu_model) {
+               const std::pair<double, double>& init_sigma, const Settings& settings, bool replace,
+               const fs::path& imu_model) {
   TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
   request.imu_model = imu_model.string();
   request.output = output.string();
@@ -111,7 +112,8 @@ RunFiles track(const fs::path& recording, const fs::path& output, const fs::path
 
 RunFiles smooth(const fs::path& recording, const fs::path& output, const fs::path& map,
                 const fs::path& calibration, const fs::path& occluders, const std::string& init,
-                const std::pair<double, double>& init_sigma, const Settings& settings, bool replace, const fs::path& imu_model) {
+                const std::pair<double, double>& init_sigma, const Settings& settings, bool replace,
+                const fs::path& imu_model) {
   TrackRequest request = request_of(recording, map, calibration, occluders, init, init_sigma, settings);
   request.imu_model = imu_model.string();
   request.output = output.string();
@@ -208,18 +210,19 @@ void bind_runs(py::module_& m) {
             for (const RunRow& row : r.rows) out.emplace_back(to_string(row.health));
             return out;
           },
-          "waiting, initialising, tracking, degraded or lost")
+          "waiting, initialising, tracking, degraded, ambiguous or lost")
       .def_property_readonly("summary", &summary_of, "what summary.json says")
       .def("table", &table_of, "file"_a = "states.csv",
            "Columns of numbers of states.csv, states_imu.csv, calibration.csv or latency.csv, by name");
   const auto known = std::pair<double, double>(0, 0);
   m.def("track", &track, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
-        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false, "imu_model"_a = "",
+        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
+        "imu_model"_a = "",
         "What evpose track does, with its options' meaning; a poor start (init_sigma: m, deg) is searched "
         "first");
   m.def("smooth", &smooth, "recording"_a, "output"_a, "map"_a = "", "calibration"_a = "", "occluders"_a = "",
-        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false, "imu_model"_a = "",
-        "What evpose smooth does: the trajectory from all data, past and future");
+        "init"_a = "auto", "init_sigma"_a = known, "settings"_a = Settings{}, "replace"_a = false,
+        "imu_model"_a = "", "What evpose smooth does: the trajectory from all data, past and future");
   py::class_<CalibrationNumber>(m, "CalibrationNumber",
                                 "One number of a calibration, with 1-sigma uncertainties")
       .def_readonly("name", &CalibrationNumber::name, "fx, cy, k1, turn x, place z, time, ...")

@@ -145,8 +145,8 @@ std::string Outputs::looked_at() const {
 std::string Outputs::healths() const {
   const auto all = std::accumulate(updates_.begin(), updates_.end(), std::uint64_t{0});
   std::string out;
-  for (const Health h :
-       {Health::tracking, Health::degraded, Health::lost, Health::initialising, Health::waiting}) {
+  for (const Health h : {Health::tracking, Health::degraded, Health::ambiguous, Health::lost,
+                         Health::initialising, Health::waiting}) {
     const std::uint64_t count = updates_[static_cast<std::size_t>(h)];
     if (count == 0) continue;
     std::array<char, 40> share{};

@@ -74,7 +74,7 @@ class Outputs {
   std::unique_ptr<Viewer> viewer_;
   TimeNs recorded_until_ = std::numeric_limits<TimeNs>::min();
   Health health_ = Health::waiting;
-  std::array<std::uint64_t, 5> updates_{};  ///< by health
+  std::array<std::uint64_t, kHealths.size()> updates_{};  ///< by health
   double least_share_ = 1, sum_of_shares_ = 0;
   std::deque<HealthChange> changes_;  ///< the last ones
   std::uint64_t judged_ = 0;          ///< updates that count in the share that was tracked

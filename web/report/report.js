@@ -239,7 +239,7 @@ function latency() {
   return { data, layout: layout({ xaxis: axis("wall time [ms]", { type: "log", dtick: 1 }), yaxis: axis("share of updates", { tickformat: ".0%", rangemode: "tozero" }), hovermode: "closest" }) };
 }
 
-const healthInk = { waiting: "idle", initialising: "idle", tracking: "good", degraded: "warm", lost: "bad" };
+const healthInk = { waiting: "idle", initialising: "idle", tracking: "good", degraded: "warm", ambiguous: "warm", lost: "bad" };
 
 /** Colours the background by health, with a legend entry for each state that occurs. */
 function healthBackground() {

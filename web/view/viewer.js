@@ -8,7 +8,7 @@ import { drawPlots, moveMark, onPick } from "./plots.js";
 
 const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
-const HEALTH = ["waiting", "initialising", "tracking", "degraded", "lost"];
+const HEALTH = ["waiting", "initialising", "tracking", "degraded", "ambiguous", "lost"];
 const COLOURS = [0x8d9aa8, 0x8d9aa8, 0x4cc2ff, 0xffb020, 0xff4d4d];
 const MOST_ROWS = 40000;
 const SPAN_S = 30; // of the plots while live

@@ -29,6 +29,7 @@ Colour colour_of(Health health) {
     case Health::tracking:
       return {0.0, 0.55, 0.24};
     case Health::degraded:
+    case Health::ambiguous:
       return {0.87, 0.56, 0.0};
     case Health::lost:
       return {0.80, 0.13, 0.13};

@@ -17,8 +17,7 @@ using Json = nlohmann::json;
 constexpr std::size_t kMostBytes = std::size_t{4} << 30;
 
 Health health_of(std::string_view name, bool* known) {
-  for (const Health health :
-       {Health::waiting, Health::initialising, Health::tracking, Health::degraded, Health::lost})
+  for (const Health health : kHealths)
     if (name == to_string(health)) return health;
   *known = false;
   return Health::waiting;

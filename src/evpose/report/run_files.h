@@ -24,7 +24,7 @@ struct RunRow {
   int events_read = 0, points = 0, points_matched = 0;
 
   /// The tracker stands by the pose.
-  bool valid() const { return health != Health::waiting && health != Health::lost; }
+  bool valid() const { return has_pose(health); }
   double position_sigma_m() const;    ///< in the weakest direction
   double rotation_sigma_deg() const;  ///< about the weakest axis
 };

@@ -35,6 +35,8 @@ constexpr std::array kExplanations{
                 "look at the report's pictures: contours must lie on events; `evpose check` the recording"},
     Explanation{"contradicts the prediction", "the IMU and the contours tell different motions",
                 "check axes, units and clock of the IMU with `evpose check`"},
+    Explanation{"explain the events alike", "the map looks the same from several places, as far as was seen",
+                "fly on to where they differ, or give a nearer --init"},
     Explanation{kSearch, "the pose was lost and is not found, or the start is further off than was said",
                 "mend what else is named; else give a nearer --init, or its true error with --init-sigma"},
     Explanation{"IMU saturated", "the motion exceeds the range of the IMU",

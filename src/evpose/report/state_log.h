@@ -29,7 +29,7 @@ struct StateRow {
 
   Matrix6d covariance_matrix() const;
   /// The tracker stands by the pose: one that it calls waiting or lost is not part of the trajectory.
-  bool valid() const { return health != Health::waiting && health != Health::lost; }
+  bool valid() const { return has_pose(health); }
 };
 
 inline constexpr std::array<const char*, 5> kStageNames{"choose", "events", "predict", "register", "fuse"};

@@ -145,6 +145,7 @@ std::string status_word(Health at_end) {
     case Health::degraded:
       return "degraded";
     case Health::waiting:
+    case Health::ambiguous:
     case Health::lost:
       return "lost";
   }

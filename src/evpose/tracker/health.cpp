@@ -37,6 +37,9 @@ Health HealthMonitor::judge(const Evidence& e, std::string* reason) {
   if (e.hopeless) {
     next = Health::lost;
     why = e.contradicted;
+  } else if (!e.ambiguous.empty()) {
+    next = Health::ambiguous;
+    why = e.ambiguous;
   } else if (e.searching) {
     next = any_accepted_ ? Health::lost : Health::initialising;
     why = e.contradicted.empty() ? e.refused : e.refused + ": " + e.contradicted;

@@ -34,9 +34,11 @@ struct Evidence {
   bool verified = true;           ///< the events have confirmed the pose since it was given or found
   std::string contradicted = {};  ///< what speaks against the pose, if the events do
   bool hopeless = false;          ///< for so long that no pose near by can be the true one
+  std::string ambiguous = {};     ///< the poses that explain the events alike, if there are several
 };
 
-/// The state machine of design.md 5.9: waiting, initialising, tracking, degraded, lost; each with a reason.
+/// The state machine of design.md 5.9: waiting, initialising, tracking, degraded,
+/// ambiguous, lost; each with a reason.
 class HealthMonitor {
  public:
   explicit HealthMonitor(const HealthConfig& config) : config_(config) {}

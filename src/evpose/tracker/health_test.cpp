@@ -94,6 +94,17 @@ TEST_F(HealthLaws, ASearchThatBecomesHopelessSaysSo) {
   EXPECT_EQ(reason_, "not in this map");
 }
 
+TEST_F(HealthLaws, SeveralPosesAreAmbiguousUntilThereIsOne) {
+  Evidence several;
+  several.searching = true;
+  several.ambiguous = "two of them";
+  EXPECT_EQ(monitor_.judge(several, &reason_), Health::ambiguous);
+  EXPECT_EQ(reason_, "two of them");
+  EXPECT_FALSE(has_pose(monitor_.state()));
+  for (int i = 0; i < 10; ++i) step(true);
+  EXPECT_EQ(monitor_.state(), Health::tracking);
+}
+
 TEST_F(HealthLaws, NotANumberIsLost) { EXPECT_EQ(step(true, std::nan("")), Health::lost); }
 
 TEST_F(HealthLaws, WithoutAnyRegistrationItKeepsInitialising) {

@@ -2,7 +2,10 @@
 #include "evpose/tracker/pose_supervisor.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <numbers>
 
 namespace evpose {
 namespace {
@@ -18,6 +21,20 @@ constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
 constexpr const char* kOneDirection =
     "not in this map, or far from the pose: contours of one direction lie where no events are";
+
+/// Empty without any.
+std::string words_of(const std::vector<Pose>& candidates) {
+  std::string out;
+  for (const Pose& T : candidates) {
+    const Eigen::Vector3d ahead = T.q * Eigen::Vector3d::UnitX();
+    std::array<char, 100> words{};
+    std::snprintf(words.data(), words.size(), "%s(%.2f, %.2f, %.2f) m heading %.0f deg",
+                  out.empty() ? "" : ", ", T.p.x(), T.p.y(), T.p.z(),
+                  std::atan2(ahead.y(), ahead.x()) * 180 / std::numbers::pi);
+    out += words.data();
+  }
+  return out.empty() ? out : text(candidates.size(), " poses explain the events alike: ", out);
+}
 
 }  // namespace
 
@@ -142,6 +159,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.accepted = e.refused.empty();
   evidence.refused = e.refused;
   evidence.searching = pose_is_unconfirmed(e.t, e.registration);
+  evidence.ambiguous = words_of(candidates());
   // Without an IMU nothing but the image tells rotation from sideways motion: it is enough that it holds.
   const bool by_image_alone = fusion.propagator().model() == MotionModel::constant_velocity;
   evidence.sigma_px = by_image_alone ? uncertainty.image_px() : uncertainty.separate_px();

@@ -73,6 +73,10 @@ class PoseSupervisor {
 
   /// Judges an update and acts on it: a search may begin or go on.
   Health judge(const UpdateEvidence& evidence, BackEnd& fusion, std::string* reason);
+  /// Poses of the body that explain the events alike, likeliest first; none while at most one does.
+  std::vector<Pose> candidates() const {
+    return searching() ? relocalizer_.candidates() : std::vector<Pose>{};
+  }
   /// At first the estimate is that of the start, not yet that of the contours.
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;

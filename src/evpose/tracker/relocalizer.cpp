@@ -12,6 +12,7 @@ namespace {
 
 // Time between slices, and before a search is repeated.
 constexpr double kGap_s = 0.004;           // so that slices differ
+constexpr double kAmbiguousGap_s = 0.03;   // their velocities are known by then
 constexpr double kPausePerSearch_s = 0.1;  // a search costs seconds of processor time
 constexpr double kLongestPause_s = 2;
 
@@ -47,6 +48,11 @@ VisibleSetConfig points_to_search(VisibleSetConfig config) {
   config.budget = kPoints;
   config.refresh_px = 0;  // chosen anew in each slice
   return config;
+}
+
+bool are_apart(const Pose& a, const Pose& b) {
+  const Vector6d d = a.minus(b);
+  return d.head<3>().norm() >= kRival_m || d.tail<3>().norm() >= kRival_rad;
 }
 
 }  // namespace
@@ -101,11 +107,16 @@ double Relocalizer::pause_s() const {
              : std::min(kLongestPause_s, kPausePerSearch_s * (searches_ - kSearchesOfFirstWidth));
 }
 
+double Relocalizer::gap_s() const {
+  if (slices_ == 0) return pause_s();
+  return slices_ >= kMostSlices ? kAmbiguousGap_s : kGap_s;
+}
+
 std::optional<Relocalizer::Found> Relocalizer::process(const RelocalizerInput& input) {
   since_slice_ = joined(since_slice_, input.motion);
   angular_rate_ = input.angular_rate;
   workspace_->refiner.add_events(input.events, input.now_us, input.motion, input.angular_rate);
-  if (to_seconds(input.t - last_slice_) < (slices_ == 0 ? pause_s() : kGap_s)) {
+  if (to_seconds(input.t - last_slice_) < gap_s()) {
     slice_.restart(input.t);
     return {};
   }
@@ -268,19 +279,35 @@ PoseHypothesis Relocalizer::corrected_by_edges(const PoseHypothesis& predicted, 
   return out;
 }
 
+/// The true pose may not be among those of a wide search at all.
+bool Relocalizer::explains_enough(const PoseHypothesis& h) const {
+  return !workspace_->widely || h.explained >= kLeastExplained;
+}
+
 bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
-  const auto rival = std::find_if(hypotheses_.begin(), hypotheses_.end(), [&](const PoseHypothesis& h) {
-    const Vector6d d = h.nav.T_map_body.minus(best.nav.T_map_body);
-    return d.head<3>().norm() >= kRival_m || d.tail<3>().norm() >= kRival_rad;
-  });
-  // The true pose may not be among those of a wide search at all: the best of them has to explain enough.
-  if (workspace_->widely && best.explained < kLeastExplained) return false;
+  const auto rival = std::ranges::find_if(
+      hypotheses_, [&](const PoseHypothesis& h) { return are_apart(h.nav.T_map_body, best.nav.T_map_body); });
+  if (!explains_enough(best)) return false;
   const double rival_support = rival == hypotheses_.end() ? 0 : rival->mean_support;
   const bool concentrated =
       best.mean_concentration >= kLeastConcentration && best.mean_support >= kLeastLead * rival_support;
   const bool alone =
       best.mean_concentration >= kLowConcentration && best.mean_support >= kClearLead * rival_support;
   return concentrated || alone;
+}
+
+std::vector<Pose> Relocalizer::candidates() const {
+  std::vector<Pose> out;
+  if (slices_ < kLeastSlices) return out;
+  for (const PoseHypothesis& h : hypotheses_) {
+    const bool alike = explains_enough(h) && h.mean_concentration >= kLeastConcentration &&
+                       kLeastLead * h.mean_support > hypotheses_.front().mean_support;
+    const bool apart =
+        std::ranges::all_of(out, [&](const Pose& T) { return are_apart(h.nav.T_map_body, T); });
+    if (alike && apart) out.push_back(h.nav.T_map_body);
+  }
+  if (out.size() < 2) out.clear();
+  return out;
 }
 
 /// The best hypothesis if it is accepted; otherwise more slices are waited for, or the search starts anew.
@@ -295,6 +322,7 @@ std::optional<Relocalizer::Found> Relocalizer::accept_best() {
       searching_ = false;
       return Found{best.nav, motion_.angular_rate(best, angular_rate_)};
     }
+    if (!candidates().empty()) return {};
     const bool promising = best.mean_concentration >= kLowConcentration;
     if (slices_ < (promising ? kMostSlices : kLeastSlices + 1)) return {};
   }

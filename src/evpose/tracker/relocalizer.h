@@ -60,6 +60,9 @@ class Relocalizer {
   bool searching() const { return searching_; }
   /// The pose is not where it was searched, at any width of the search.
   bool has_tried_all() const;
+  /// Poses of the body that explain the events so alike that their further motion has to decide, likeliest
+  /// first; none while at most one is in question.
+  std::vector<Pose> candidates() const;
   /// The pose found was wrong: searches again around where the search began.
   void restart_search(TimeNs t);
   /// The map's index is that of another part from now on. Not while searching.
@@ -90,6 +93,8 @@ class Relocalizer {
     std::vector<SearchPoint> points;
   };
   double pause_s() const;
+  double gap_s() const;
+  bool explains_enough(const PoseHypothesis& h) const;
   void process_slice(const RelocalizerInput& input);
   void propagate_prior();
   SearchView view_from(const Pose& T_map_body, const Pose& T_body_cam);

@@ -86,7 +86,8 @@ class RelocalizerLaws : public ::testing::Test {
 
   struct Outcome {
     bool found = false;
-    double t_s = 0;  ///< when it was found
+    double t_s = 0;                ///< when it was found, or the search was given up
+    std::vector<Pose> candidates;  ///< then
     Relocalizer::Found state;
     double position_error_m() const { return (state.nav.T_map_body.p - pose_at(t_s).p).norm(); }
     double rotation_error_rad() const { return state.nav.T_map_body.minus(pose_at(t_s)).tail<3>().norm(); }
@@ -117,12 +118,14 @@ class RelocalizerLaws : public ::testing::Test {
       const double from_s = start.t_s + i * kUpdate_s, to_s = from_s + kUpdate_s;
       const ImuIncrement motion = motion_between(from_s, to_s);
       const Eigen::Vector3d rate = test_flight::imu_at(to_s).gyro;
-      const auto events = front_events(from_s, to_s);
+      auto events = front_events(from_s, to_s);
+      if (i * kUpdate_s < covered_s_)
+        std::erase_if(events, [](const FilteredEvent& e) { return e.x > 2 * camera_->size().width / 3; });
       if (const auto found =
               relocalizer.process({time(to_s), now_us(to_s), events, motion, rate, T_body_cam_}))
-        return {true, to_s, *found};
+        return {true, to_s, {}, *found};
     }
-    return {};
+    return {false, start.t_s + std::ceil(seconds / kUpdate_s) * kUpdate_s, relocalizer.candidates(), {}};
   }
 
   struct Run {
@@ -197,6 +200,7 @@ class RelocalizerLaws : public ::testing::Test {
   VisibleSetConfig visible_;
   EventRegistrationConfig registration_;
   Pose T_body_cam_ = test_flight::camera_on_body();
+  double covered_s_ = 0;  ///< of a search: without events of the image's right third
 };
 
 TEST_F(RelocalizerLaws, FindsThePoseFromPoorStartsWithinItsSigmas) {
@@ -229,6 +233,46 @@ TEST_F(RelocalizerLaws, RefusesTheMapOfAnotherPlaceAtAnyHeading) {
 
 TEST_F(RelocalizerLaws, RefusesTheMapOfAnotherPlace) {
   for (unsigned seed = 1; seed <= 3; ++seed) EXPECT_FALSE(search(seed, *other_, 0.15).found) << seed;
+}
+
+/// Every contour twice: in its place, and at kTwin beside it.
+const Eigen::Vector3d kTwin(0, 0.3, 0);
+ContourMap with_twins(const ContourMap& map, double from_y_m) {
+  ContourMap out = map;
+  const std::uint32_t first = map.points.back().contour + 1;
+  for (ContourPoint p : map.points) {
+    if (p.position.y() < from_y_m) continue;
+    p.position += kTwin.cast<float>();
+    p.contour += first;
+    out.points.push_back(p);
+  }
+  return out;
+}
+
+PoorStart between_twins() {
+  PoorStart start(1);
+  start.T_map_body = pose_at(start.t_s);
+  start.T_map_body.p += kTwin / 2;
+  return start;
+}
+
+TEST_F(RelocalizerLaws, PosesThatExplainTheEventsAlikeAreCandidatesAndNoneIsTaken) {
+  const Outcome outcome = search(between_twins(), 0.1, 0.01, with_twins(*world_, 0), 0.4);
+  EXPECT_FALSE(outcome.found);
+  ASSERT_EQ(outcome.candidates.size(), 2U);
+  const Eigen::Vector3d &p = outcome.candidates[0].p, &q = outcome.candidates[1].p;
+  EXPECT_NEAR((p - q).norm(), kTwin.norm(), 0.01);
+  const Eigen::Vector3d truth = pose_at(outcome.t_s).p;
+  EXPECT_LT(std::min((p - truth).norm(), (q - truth).norm()), 0.01);
+}
+
+TEST_F(RelocalizerLaws, MotionDecidesBetweenPosesThatExplainedTheEventsAlike) {
+  const ContourMap map = with_twins(*world_, 2);
+  covered_s_ = 0.25;
+  EXPECT_EQ(search(between_twins(), 0.1, 0.01, map, covered_s_).candidates.size(), 2U);
+  const Outcome outcome = search(between_twins(), 0.1, 0.01, map, 2 * covered_s_);
+  EXPECT_TRUE(outcome.within_sigmas()) << outcome.position_error_m();
+  EXPECT_GT(outcome.t_s, between_twins().t_s + covered_s_);
 }
 
 TEST_F(RelocalizerLaws, SettingsOfVisiblePointsReachTheSearch) {

@@ -384,7 +384,7 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
       {t, span_s, measurement, refused, fault(t, measurement), typical_view(), frames_confirm(t)}, *fusion_,
       &reason);
   covariance += supervisor_.doubt();
-  reporter_.add_judgement(health, std::move(reason), covariance);
+  reporter_.add_judgement(health, std::move(reason), supervisor_.candidates(), covariance);
 }
 
 /// What is wrong with the data, in words; empty if nothing is.

@@ -13,6 +13,8 @@ const char* to_string(Health health) {
       return "tracking";
     case Health::degraded:
       return "degraded";
+    case Health::ambiguous:
+      return "ambiguous";
     case Health::lost:
       return "lost";
   }

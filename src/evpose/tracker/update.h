@@ -5,13 +5,21 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "evpose/core/pose.h"
 
 namespace evpose {
 
-enum class Health { waiting, initialising, tracking, degraded, lost };
+/// Ambiguous: several poses explain the events alike, and none is believed.
+enum class Health { waiting, initialising, tracking, degraded, ambiguous, lost };
+inline constexpr std::array kHealths{Health::waiting,  Health::initialising, Health::tracking,
+                                     Health::degraded, Health::ambiguous,    Health::lost};
 const char* to_string(Health health);
+/// There is a pose, be it one that is not confirmed.
+inline bool has_pose(Health h) {
+  return h == Health::initialising || h == Health::tracking || h == Health::degraded;
+}
 
 /// Wall time of one update by stage, seconds. Filled by the tracker from a clock that the driver hands in;
 /// nothing in the estimate depends on it.
@@ -36,6 +44,7 @@ struct Update {
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< map frame, m^2/s^2
   Health health = Health::waiting;
   std::string reason;               ///< of the health, in words; set when it changed, else empty
+  std::vector<Pose> candidates;     ///< while ambiguous: values that T_map_body may have, likeliest first
   bool accepted = false;            ///< the registration passed the innovation gate and was used
   std::int32_t events_read = 0;     ///< since the last update
   std::int32_t events_shed = 0;     ///< of these, left out because too many came (events.most_mev_s)

@@ -31,9 +31,11 @@ void UpdateReporter::add_registration(const RegistrationResult& r, double innova
   update_.other_motion = r.other_motion;
 }
 
-void UpdateReporter::add_judgement(Health health, std::string reason, const Matrix6d& covariance) {
+void UpdateReporter::add_judgement(Health health, std::string reason, std::vector<Pose> candidates,
+                                   const Matrix6d& covariance) {
   update_.health = health;
   update_.reason = std::move(reason);
+  update_.candidates = std::move(candidates);
   update_.covariance = covariance;
 }
 

@@ -27,7 +27,8 @@ class UpdateReporter {
   void add_registration(const RegistrationResult& registration, double innovation, bool accepted,
                         double share);
   /// The pose's covariance as it was judged.
-  void add_judgement(Health health, std::string reason, const Matrix6d& covariance);
+  void add_judgement(Health health, std::string reason, std::vector<Pose> candidates,
+                     const Matrix6d& covariance);
   /// The state at the end of the update, and the counts of events until now.
   Update finish(const FusionState& state, const EventPreprocessor::Counts& counts);
 

@@ -12,8 +12,6 @@
 namespace evpose {
 namespace {
 
-constexpr const char* kHealths[] = {"waiting", "initialising", "tracking", "degraded", "lost"};
-
 /// From the newest event to the pose; NAN where the row does not tell.
 double delay_ms(CsvRow times) {
   const double sum = times.number("predict_ms") + times.number("register_ms") + times.number("fuse_ms");
@@ -21,8 +19,8 @@ double delay_ms(CsvRow times) {
 }
 
 double number_of_health(std::string_view name) {
-  const auto found = std::find(std::begin(kHealths), std::end(kHealths), name);
-  return found == std::end(kHealths) ? 0 : static_cast<double>(found - std::begin(kHealths));
+  const auto found = std::ranges::find_if(kHealths, [&](Health h) { return name == to_string(h); });
+  return found == kHealths.end() ? 0 : static_cast<double>(found - kHealths.begin());
 }
 
 /// The largest sigma of the rotation, degrees.

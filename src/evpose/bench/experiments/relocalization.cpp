@@ -219,7 +219,7 @@ WrongOutcome start_wrong(const Streams& streams, Wrong wrong, std::shared_ptr<co
     // symmetry.
     const bool right = e.head<3>().norm() < kLocked_m;
     out.tracking += u.health == Health::tracking && !right ? 1 : 0;
-    if (u.health == Health::waiting || u.health == Health::lost) return;
+    if (!has_pose(u.health)) return;
     const Vector6d sigma = u.covariance.diagonal().cwiseSqrt();
     out.beyond += (e.cwiseAbs().array() > 3 * sigma.array()).any() ? 1 : 0;
   });

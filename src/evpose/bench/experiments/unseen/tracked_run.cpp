@@ -97,7 +97,7 @@ Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPo
     if (p.pose.t < from) continue;
     ++out.poses;
     tracking += p.health == Health::tracking ? 1 : 0;
-    if (p.health == Health::waiting || p.health == Health::lost) continue;
+    if (!has_pose(p.health)) continue;
     stood_by.push_back(p);
     estimate.push_back(p.pose);
     covariances.push_back(p.covariance);

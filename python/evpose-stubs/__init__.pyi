@@ -40,10 +40,13 @@ class Update:
         """6x6 of (translation in the map, rotation in the body), m^2, rad^2"""
     @property
     def health(self) -> str:
-        """waiting, initialising, tracking, degraded or lost"""
+        """waiting, initialising, tracking, degraded, ambiguous or lost"""
     @property
     def reason(self) -> str:
         """of the health, where it changed"""
+    @property
+    def candidates(self) -> list[NDArray[np.float64]]:
+        """while ambiguous: 4x4 values that T_map_body may have, likeliest first"""
     @property
     def points(self) -> int:
         """chosen map points"""

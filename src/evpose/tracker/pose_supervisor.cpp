@@ -2,9 +2,7 @@
 #include "evpose/tracker/pose_supervisor.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 namespace evpose {
@@ -24,14 +22,13 @@ constexpr const char* kOneDirection =
 
 /// Empty without any.
 std::string words_of(const std::vector<Pose>& candidates) {
+  const auto cm = [](double m) { return std::round(100 * m) / 100; };
   std::string out;
   for (const Pose& T : candidates) {
     const Eigen::Vector3d ahead = T.q * Eigen::Vector3d::UnitX();
-    std::array<char, 100> words{};
-    std::snprintf(words.data(), words.size(), "%s(%.2f, %.2f, %.2f) m heading %.0f deg",
-                  out.empty() ? "" : ", ", T.p.x(), T.p.y(), T.p.z(),
-                  std::atan2(ahead.y(), ahead.x()) * 180 / std::numbers::pi);
-    out += words.data();
+    const auto heading_deg = std::lround(std::atan2(ahead.y(), ahead.x()) * 180 / std::numbers::pi);
+    out += text(out.empty() ? "" : ", ", "(", cm(T.p.x()), ", ", cm(T.p.y()), ", ", cm(T.p.z()),
+                ") m heading ", heading_deg, " deg");
   }
   return out.empty() ? out : text(candidates.size(), " poses explain the events alike: ", out);
 }

@@ -130,11 +130,13 @@ class RelocalizerLaws : public ::testing::Test {
 
   struct Run {
     int threads = 1, packet_ms = 1;
+    PoorStart start = PoorStart(1);
+    std::shared_ptr<const ContourMap> map = world_;
   };
-  /// What the tracker says from the first poor start, for so long.
+  /// What the tracker says from a poor start, for so long.
   std::vector<Update> track(const Run& run, double seconds) const {
-    const PoorStart poor(1);
-    auto tracker = make_tracker(poor, run.threads);
+    const PoorStart& poor = run.start;
+    auto tracker = make_tracker(poor, run.map, run.threads);
     std::vector<Update> updates;
     tracker->on_update([&](const Update& u) { updates.push_back(u); });
     int imu = -1, packets = static_cast<int>(std::lround(1e3 * seconds)) / run.packet_ms;
@@ -151,12 +153,13 @@ class RelocalizerLaws : public ::testing::Test {
   /// No point of the map is registered while the pose is searched.
   static bool searching(const Update& u) { return u.points == 0; }
 
-  std::unique_ptr<Tracker> make_tracker(const PoorStart& poor, int threads) const {
+  std::unique_ptr<Tracker> make_tracker(const PoorStart& poor, std::shared_ptr<const ContourMap> map,
+                                        int threads) const {
     TrackerSetup setup;
     setup.camera = camera_;
     setup.T_body_cam = test_flight::camera_on_body();
     setup.imu_noise.rate_hz = 1 / test_flight::kImuPeriod_s;
-    setup.map = world_;
+    setup.map = std::move(map);
     TrackerConfig config;
     config.threads = threads;
     config.visible = visible_;
@@ -273,6 +276,16 @@ TEST_F(RelocalizerLaws, MotionDecidesBetweenPosesThatExplainedTheEventsAlike) {
   const Outcome outcome = search(between_twins(), 0.1, 0.01, map, 2 * covered_s_);
   EXPECT_TRUE(outcome.within_sigmas()) << outcome.position_error_m();
   EXPECT_GT(outcome.t_s, between_twins().t_s + covered_s_);
+}
+
+TEST_F(RelocalizerLaws, TheTrackerTellsWhichPosesAreAmbiguous) {
+  const auto map = std::make_shared<const ContourMap>(with_twins(*world_, 0));
+  const auto updates = track({.start = between_twins(), .map = map}, 0.35);
+  EXPECT_EQ(updates.back().health, Health::ambiguous);
+  EXPECT_EQ(updates.back().candidates.size(), 2U);
+  const auto first = std::ranges::find(updates, Health::ambiguous, &Update::health);
+  EXPECT_TRUE(first->reason.starts_with("2 poses explain the events alike: (")) << first->reason;
+  for (const Update& u : updates) EXPECT_NE(u.health, Health::tracking);
 }
 
 TEST_F(RelocalizerLaws, SettingsOfVisiblePointsReachTheSearch) {

@@ -187,7 +187,7 @@ class Run:
         """(n,): the tracker stands by the pose"""
     @property
     def health(self) -> list[str]:
-        """waiting, initialising, tracking, degraded or lost"""
+        """waiting, initialising, tracking, degraded, ambiguous or lost"""
     @property
     def summary(self) -> Any:
         """what summary.json says"""

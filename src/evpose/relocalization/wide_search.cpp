@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/registration/coarse_ranking.h"
 #include "evpose/relocalization/place_search.h"
 
 namespace evpose {
@@ -25,6 +26,8 @@ constexpr double kAbove_px = 100;                     // 1 sigma
 constexpr double kBeside_m = 0.5, kBesideSigmas = 1;  // of the first prior, places are known, too
 constexpr double kTypicalDepth_m = 3;                 // turns metres into pixels
 constexpr double kReach = 0.03;                       // of the first refinement, tangent units
+constexpr std::size_t kComparedPoints = 500;          // at most, in the first refinement
+constexpr double kNearest_m = 0.2;                    // from the camera
 
 VisibleSetConfig points_to_refine(VisibleSetConfig config) {
   config.stride_px = 8;
@@ -93,13 +96,42 @@ void WideSearch::prepare(const WidePrior& prior) {
   places_ = cache_.over(index_, visible_config_, places_box_);
 }
 
-PoseGuess WideSearch::refine(const EdgeField& field, const Pose& T_body_cam, const PoseGuess& guess,
-                             double from_px, double sigma_m, double sigma_rad) {
+/// What can be seen from the middle of the place that the camera is in: looking at what hides contours from
+/// each of many poses takes most of a search's time.
+void WideSearch::see_from_nearest_place(const Pose& T_map_cam) {
+  const auto distance = [&](const PlaceIndex::Place& p) { return (p.middle - T_map_cam.p).squaredNorm(); };
+  const PlaceIndex::Place& place = *std::ranges::min_element(places_->places(), {}, distance);
+  const Eigen::Vector2d half = half_view(camera_);
+  const Eigen::Matrix3d R_cam_map = T_map_cam.rotation().transpose();
+  points_.clear();
+  for (const int direction :
+       PlaceIndex::directions_around(T_map_cam.q * Eigen::Vector3d::UnitZ(), std::atan(half.norm()))) {
+    for (const std::uint32_t number : places_->seen_from(place, direction)) {
+      const PlaceIndex::Sample& sample = places_->sample(number);
+      const Eigen::Vector3d position = places_->anchor() + sample.position.cast<double>();
+      const Eigen::Vector3d x = R_cam_map * (position - T_map_cam.p);
+      if (x.z() > kNearest_m && std::abs(x.x()) < half.x() * x.z() && std::abs(x.y()) < half.y() * x.z())
+        points_.push_back({position, sample.tangent.cast<double>()});
+    }
+  }
+  const std::size_t step = points_.size() / kComparedPoints + 1;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points_.size(); i += step) points_[kept++] = points_[i];
+  points_.resize(kept);
+}
+
+void WideSearch::see_from(const Pose& T_map_cam) {
   const ContourMap& map = index_.map();
   points_.clear();
-  for (const std::uint32_t i : visible_.choose(guess.T_map_body * T_body_cam))
+  for (const std::uint32_t i : visible_.choose(T_map_cam))
     points_.push_back({map.position(i), map.points[i].tangent.cast<double>()});
+}
+
+/// By the points in view.
+PoseGuess WideSearch::refine(const EdgeField& field, const Pose& T_body_cam, const PoseGuess& guess,
+                             double from_px) const {
   if (points_.empty()) return {guess.T_map_body, -1e3};
+  const double sigma_m = kPlaceSigma * places_->edge_m(), sigma_rad = kAttitudeSigma_rad;
   Vector6d information;
   information << Eigen::Vector3d::Constant(1 / (sigma_m * sigma_m)),
       Eigen::Vector3d::Constant(1 / (sigma_rad * sigma_rad));
@@ -125,12 +157,16 @@ std::vector<PoseGuess> WideSearch::find(std::span<const FilteredEvent> events, c
   std::vector<PoseGuess> guesses =
       search_places(lines, camera_, T_body_cam, *places_, box(prior), attitudes, kPlaces);
   keep_different(guesses, kDifferent_m, kDifferent_rad, kRefined);
-  for (PoseGuess& g : guesses)
-    g = refine(field, T_body_cam, g, std::max(refine_reach_px(), kReach * camera_.focal_px()),
-               kPlaceSigma * places_->edge_m(), kAttitudeSigma_rad);
+  const double reach_px = std::max(refine_reach_px(), kReach * camera_.focal_px());
+  for (PoseGuess& g : guesses) {
+    see_from_nearest_place(g.T_map_body * T_body_cam);
+    g = refine(field, T_body_cam, g, reach_px);
+  }
   keep_different(guesses, kSame_m, kSame_rad, kKept);
-  for (PoseGuess& g : guesses)  // what is seen from there now
-    g = refine(field, T_body_cam, g, kLastReach_px, kPlaceSigma * places_->edge_m(), kAttitudeSigma_rad);
+  for (PoseGuess& g : guesses) {
+    see_from(g.T_map_body * T_body_cam);
+    g = refine(field, T_body_cam, g, kLastReach_px);
+  }
   keep_different(guesses, kSame_m, kSame_rad, kKept);
   return guesses;
 }

@@ -44,8 +44,10 @@ class WideSearch {
 
  private:
   Eigen::AlignedBox3d box(const WidePrior& prior) const;
-  PoseGuess refine(const EdgeField& field, const Pose& T_body_cam, const PoseGuess& guess, double from_px,
-                   double sigma_m, double sigma_rad);
+  void see_from_nearest_place(const Pose& T_map_cam);
+  void see_from(const Pose& T_map_cam);
+  PoseGuess refine(const EdgeField& field, const Pose& T_body_cam, const PoseGuess& guess,
+                   double from_px) const;
 
   const ContourIndex& index_;
   const Camera& camera_;
@@ -57,7 +59,7 @@ class WideSearch {
   PlaceCache& cache_;
   std::shared_ptr<const PlaceIndex> places_;
   Eigen::AlignedBox3d places_box_;
-  std::vector<SearchPoint> points_;
+  std::vector<SearchPoint> points_;  ///< in view
 };
 
 }  // namespace evpose

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "evpose/core/log.h"
 
@@ -66,6 +67,11 @@ bool Recovery::tracks() const {
   return last_ && last_->health == Health::tracking;
 }
 
+std::string Recovery::take_ambiguous() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(ambiguous_, {});
+}
+
 bool Recovery::needs_search() const {
   const std::lock_guard lock(mutex_);
   return needs_search_;
@@ -119,6 +125,7 @@ void Recovery::run(const Make& make) {
     tracker_->on_update([this](const Update& u) {
       const std::lock_guard inner(mutex_);
       last_ = u;
+      if (u.health == Health::ambiguous && !u.reason.empty()) ambiguous_ = u.reason;
       needs_search_ = tracker_->needs_search();
     });
     made_ = true;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 #include <variant>
 
@@ -56,6 +57,8 @@ class Recovery {
   bool tracks() const;
   /// Its tracker does not search, and has to.
   bool needs_search() const;
+  /// The poses that explain the events alike, in words, once each time there are several; else empty.
+  std::string take_ambiguous();
   /// It cannot be made, or too much waits.
   bool failed() const;
   /// Asks the thread to end, which it does when its tracker returns from what it does.
@@ -77,6 +80,7 @@ class Recovery {
   bool made_ = false, failed_ = false, stopped_ = false, ended_ = false, busy_ = false, needs_search_ = false;
   EvenShare share_{kMost_mev_s};
   std::optional<Update> last_;        ///< of the tracker
+  std::string ambiguous_;             ///< not taken yet
   std::unique_ptr<Tracker> tracker_;  ///< the thread's until it has ended
   std::thread thread_;
 };

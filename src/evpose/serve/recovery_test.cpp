@@ -97,6 +97,23 @@ class RecoveryOfPackets : public RecoveryLaws {
   }
 };
 
+TEST_F(RecoveryLaws, PosesThatExplainTheEventsAlikeAreNamedOnce) {
+  setup_.map = std::make_shared<const ContourMap>(test_flight::with_twins(*world_, {0, -0.25, 0}));
+  TrackerStart start = start_off(0.1);
+  start.searches = true;
+  Recovery recovery([&] { return make_tracker(setup_, {}, start); }, true);
+  std::vector<std::string> named;
+  feed(
+      0.1, 0.5, 2, [&](const ImuSample& s) { recovery.add_imu(s); },
+      [&](const EventPacket& p) {
+        recovery.add_events(p);
+        if (std::string poses = recovery.take_ambiguous(); !poses.empty()) named.push_back(poses);
+      });
+  ASSERT_EQ(named.size(), 1U);
+  EXPECT_TRUE(named.front().starts_with("2 poses explain the events alike: (")) << named.front();
+  EXPECT_EQ(recovery.take(), nullptr);
+}
+
 TEST_F(RecoveryOfPackets, TakesOverWhereTheDataAreAndTracksOnTheSameEachTime) {
   const Found found = find(2), other = find(2);
   ASSERT_GT(found.at_s, 0);

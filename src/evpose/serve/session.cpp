@@ -284,6 +284,8 @@ void Session::end_search() {
 /// Takes what a search has found, begins one when the pose is lost, and ends it when it is there again.
 void Session::mind_search() {
   std::erase_if(given_up_, [](const auto& r) { return r->ended(); });
+  if (const std::string poses = recovery_ ? recovery_->take_ambiguous() : ""; !poses.empty())
+    hooks_.notice("ambiguous: " + poses);
   if (auto found = recovery_ ? recovery_->take() : nullptr) {
     count_tracker();
     use(std::move(found));

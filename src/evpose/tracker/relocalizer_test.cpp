@@ -238,19 +238,7 @@ TEST_F(RelocalizerLaws, RefusesTheMapOfAnotherPlace) {
   for (unsigned seed = 1; seed <= 3; ++seed) EXPECT_FALSE(search(seed, *other_, 0.15).found) << seed;
 }
 
-/// Every contour twice: in its place, and at kTwin beside it.
 const Eigen::Vector3d kTwin(0, 0.3, 0);
-ContourMap with_twins(const ContourMap& map, double from_y_m) {
-  ContourMap out = map;
-  const std::uint32_t first = map.points.back().contour + 1;
-  for (ContourPoint p : map.points) {
-    if (p.position.y() < from_y_m) continue;
-    p.position += kTwin.cast<float>();
-    p.contour += first;
-    out.points.push_back(p);
-  }
-  return out;
-}
 
 PoorStart between_twins() {
   PoorStart start(1);
@@ -260,7 +248,7 @@ PoorStart between_twins() {
 }
 
 TEST_F(RelocalizerLaws, PosesThatExplainTheEventsAlikeAreCandidatesAndNoneIsTaken) {
-  const Outcome outcome = search(between_twins(), 0.1, 0.01, with_twins(*world_, 0), 0.4);
+  const Outcome outcome = search(between_twins(), 0.1, 0.01, test_flight::with_twins(*world_, kTwin), 0.4);
   EXPECT_FALSE(outcome.found);
   ASSERT_EQ(outcome.candidates.size(), 2U);
   const Eigen::Vector3d &p = outcome.candidates[0].p, &q = outcome.candidates[1].p;
@@ -270,7 +258,7 @@ TEST_F(RelocalizerLaws, PosesThatExplainTheEventsAlikeAreCandidatesAndNoneIsTake
 }
 
 TEST_F(RelocalizerLaws, MotionDecidesBetweenPosesThatExplainedTheEventsAlike) {
-  const ContourMap map = with_twins(*world_, 2);
+  const ContourMap map = test_flight::with_twins(*world_, kTwin, 2);
   covered_s_ = 0.25;
   EXPECT_EQ(search(between_twins(), 0.1, 0.01, map, covered_s_).candidates.size(), 2U);
   const Outcome outcome = search(between_twins(), 0.1, 0.01, map, 2 * covered_s_);
@@ -279,7 +267,7 @@ TEST_F(RelocalizerLaws, MotionDecidesBetweenPosesThatExplainedTheEventsAlike) {
 }
 
 TEST_F(RelocalizerLaws, TheTrackerTellsWhichPosesAreAmbiguous) {
-  const auto map = std::make_shared<const ContourMap>(with_twins(*world_, 0));
+  const auto map = std::make_shared<const ContourMap>(test_flight::with_twins(*world_, kTwin));
   const auto updates = track({.start = between_twins(), .map = map}, 0.35);
   EXPECT_EQ(updates.back().health, Health::ambiguous);
   EXPECT_EQ(updates.back().candidates.size(), 2U);

@@ -90,6 +90,19 @@ inline ContourMap boxes(unsigned seed = 3) {
   return map;
 }
 
+/// Every contour from there on along y twice: in its place, and moved by `to_twin`.
+inline ContourMap with_twins(const ContourMap& map, const Eigen::Vector3d& to_twin, double from_y_m = 0) {
+  ContourMap out = map;
+  const std::uint32_t first = map.points.back().contour + 1;
+  for (ContourPoint p : map.points) {
+    if (p.position.y() < from_y_m) continue;
+    p.position += to_twin.cast<float>();
+    p.contour += first;
+    out.points.push_back(p);
+  }
+  return out;
+}
+
 struct TimedEvent {
   double t_s;
   Event event;

@@ -22,13 +22,6 @@ constexpr double kMemory_s = 0.1, kLongestMemory_s = 1;  // the longer one while
 constexpr float kEnoughWay_px = 2;
 constexpr float kForgotten_px = 1e-2F;
 
-/// Which of `count` equal sectors of the half circle the line lies in that has this normal.
-std::uint8_t sector_of(const Eigen::Vector2d& normal, std::size_t count) {
-  const double turns = std::atan2(normal.y(), normal.x()) / M_PI;  // of the half circle
-  const double sector = std::floor((turns - std::floor(turns)) * static_cast<double>(count));
-  return static_cast<std::uint8_t>(std::min(static_cast<std::size_t>(sector), count - 1));
-}
-
 constexpr double kSigma = 2;  // by so much, and by chance, pieces have more events on them than beside
 
 // How much has to be seen, and of it.
@@ -44,6 +37,13 @@ constexpr double kDirectionRatio = 1.7, kDirectionShare = 0.05;  // one of the t
 constexpr double kDirectionRatioUnhidden = 1.4;
 constexpr double kFewestPiecesOfOne = 15, kFewestEventsOfOne = 60;  // of a direction that counts
 constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
+
+/// Which of `count` equal sectors of the half circle the line lies in that has this normal.
+std::uint8_t sector_of(const Eigen::Vector2d& normal, std::size_t count) {
+  const double turns = std::atan2(normal.y(), normal.x()) / M_PI;  // of the half circle
+  const double sector = std::floor((turns - std::floor(turns)) * static_cast<double>(count));
+  return static_cast<std::uint8_t>(std::min(static_cast<std::size_t>(sector), count - 1));
+}
 
 }  // namespace
 

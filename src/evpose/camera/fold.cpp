@@ -6,7 +6,7 @@
 namespace evpose {
 
 double fold_angle(const std::function<double(double)>& growth, double end_rad) {
-  constexpr double kStep = 0.01 * std::numbers::pi / 180;
+  constexpr double kStep = 0.1 * std::numbers::pi / 180;  // about a pixel: no dip that is narrower matters
   double inside = 0, outside = kStep;
   while (outside < end_rad && growth(outside) > 0) {
     inside = outside;

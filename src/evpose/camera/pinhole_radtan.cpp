@@ -30,6 +30,7 @@ PinholeRadtan::PinholeRadtan(const CameraIntrinsics& intrinsics)
     k1_ = d[0], k2_ = d[1], p1_ = d[2], p2_ = d[3];
     if (d.size() > 4) k3_ = d[4];
   }
+  tangential_ = std::hypot(p1_, p2_);
   valid_angle_ = fold_angle([this](double angle) { return least_determinant(std::tan(angle)); }, kMaxAngle);
   valid_radius2_ = square(std::tan(valid_angle_));
 }
@@ -44,7 +45,7 @@ double PinholeRadtan::least_determinant(double r) const {
   const double across = 1 + r2 * (k1_ + r2 * (k2_ + r2 * k3_));             // F' / r
   const double along = 1 + r2 * (3 * k1_ + r2 * (5 * k2_ + r2 * 7 * k3_));  // F''
   if (!(across > 0) || !(along > 0)) return -1;
-  const double tangential = r * std::hypot(p1_, p2_);
+  const double tangential = r * tangential_;
   const double slope = 2 * tangential * (along + 3 * across);
   const double curvature = 16 * square(tangential);
   const double c = curvature > 0 ? std::max(-1.0, -slope / (2 * curvature)) : 0;

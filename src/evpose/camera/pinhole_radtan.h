@@ -32,6 +32,7 @@ class PinholeRadtan final : public Camera {
   double fx_, fy_, cx_, cy_;
   bool distorted_;
   double k1_ = 0, k2_ = 0, p1_ = 0, p2_ = 0, k3_ = 0;
+  double tangential_ = 0;  ///< |(p1, p2)|
   ImageSize size_;
   double valid_angle_;
   double valid_radius2_;  ///< tan^2 of valid_angle_

@@ -116,22 +116,21 @@ class EventPixels::LowPassResponse {
 
 namespace {
 
-/// First time in (low, high] at which the signal reaches `on` or `off`, in ns from the span's start. The
-/// curvature of the signal has one sign, hence one extremum at most.
+/// First time in (low, high] at which the signal reaches `on` or `off`, in ns from the span's start; it has
+/// the value `last` at `high`. The curvature of the signal has one sign, hence one extremum at most.
 template <class Signal>
 std::optional<std::pair<double, bool>> first_crossing(const Signal& signal, double low, double high,
-                                                      double on, double off) {
-  const auto crossing = [&](double a, double b) -> std::optional<std::pair<double, bool>> {
-    const double end = signal.value(b);
+                                                      double last, double on, double off) {
+  const auto crossing = [&](double a, double b, double end) -> std::optional<std::pair<double, bool>> {
     if (end < on && end > off) return std::nullopt;
     const double start = signal.value(a);
     if (end >= on) return std::pair(start >= on ? a : root(signal, on, a, b, start, end), true);
     return std::pair(start <= off ? a : root(signal, off, a, b, start, end), false);
   };
   const double turn = signal.turn();
-  if (!(turn > low && turn < high)) return crossing(low, high);
-  if (const auto found = crossing(low, turn)) return found;
-  return crossing(turn, high);
+  if (!(turn > low && turn < high)) return crossing(low, high, last);
+  if (const auto found = crossing(low, turn, signal.value(turn))) return found;
+  return crossing(turn, high, last);
 }
 
 }  // namespace
@@ -244,6 +243,7 @@ void EventPixels::emit_events(std::size_t pixel, TimeNs t0, TimeNs t1, const Sig
                               std::vector<SimEvent>& events) {
   Pixel& p = pixels_[pixel];
   const auto since = [&](TimeNs t) { return static_cast<double>(t - t0); };
+  const double last = signal.value(since(t1));
   TimeNs now = t0;
   while (true) {
     if (high_[pixel] == kInfinity) {  // in reset: the reference follows the signal
@@ -254,7 +254,7 @@ void EventPixels::emit_events(std::size_t pixel, TimeNs t0, TimeNs t1, const Sig
     }
     while (p.next_noise < now) draw_next_noise(pixel, p.next_noise);  // noise during a reset is lost
     const auto crossing =
-        first_crossing(signal, since(now), since(t1), p.reference + p.on, p.reference - p.off);
+        first_crossing(signal, since(now), since(t1), last, p.reference + p.on, p.reference - p.off);
     const TimeNs t_crossing =
         crossing ? std::clamp(t0 + static_cast<TimeNs>(std::ceil(crossing->first)), t0 + 1, t1) : kNever;
     if (std::min(t_crossing, p.next_noise) > t1) break;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 
 #include "evpose/core/config.h"
 #include "evpose/core/parallel.h"
@@ -41,6 +42,19 @@ struct Block {
   float glare;
   std::array<SceneView, kGrid + 1> views;  // those that some tile uses
   std::vector<PartExtent> parts;
+  // Views at the quarters of each step of the tiles that take as many samples; made by the first of them.
+  mutable std::array<std::vector<StepIntegrator::QuarterViews>, kCounts.size()> quarters;
+  mutable std::array<std::once_flag, kCounts.size()> have_quarters;
+
+  const StepIntegrator::QuarterViews& quarters_of(int samples, int step) const {
+    const auto number = std::find(kCounts.begin(), kCounts.end(), samples) - kCounts.begin();
+    std::call_once(have_quarters[number], [&] {
+      for (int n = 0; n < samples; ++n)
+        quarters[number].push_back(
+            StepIntegrator::quarter_views(views[n * kGrid / samples], views[(n + 1) * kGrid / samples]));
+    });
+    return quarters[number][step];
+  }
 };
 
 // No pixel of the tile moves faster, in px/s: the flow changes monotonically with 1 / depth.
@@ -237,8 +251,19 @@ void PixelIntegrator::Impl::integrate_tile(std::size_t k, TileSampler& sampler, 
     sampler.sample(block.views[to], after);
     tile.counts.samples += static_cast<std::int64_t>(tile.tile.width) * tile.tile.height;
     tile.counts.border_samples += static_cast<std::int64_t>(after.borders.size());
-    StepIntegrator step{prepared,   sampler, pixels, size,  plan,        {block.views[from], block.views[to]},
-                        t0,         t1,      before, after, block.glare, block.exposures,
+    StepIntegrator step{prepared,
+                        sampler,
+                        pixels,
+                        size,
+                        plan,
+                        {block.views[from], block.views[to]},
+                        block.quarters_of(samples, n - 1),
+                        t0,
+                        t1,
+                        before,
+                        after,
+                        block.glare,
+                        block.exposures,
                         tile.events};
     step.integrate();
     tile.counts.knots += step.knots;
@@ -311,7 +336,8 @@ void PixelIntegrator::start(TimeNs t) {
   m.measure_depths(view);
   const std::vector<Exposure*> none;
   const TimeNs soon = t + kNsPerUs;
-  m.sample_first(view, {t, soon, none, 0, {}, part_extents(m.prepared.scene, m.camera, m.path, t, soon)});
+  m.sample_first(view,
+                 {t, soon, none, 0, {}, part_extents(m.prepared.scene, m.camera, m.path, t, soon), {}, {}});
   const float glare = m.glare();
   for (const TileState& tile : m.tiles) {
     for (int y = 0; y < tile.tile.height; ++y) {
@@ -327,7 +353,8 @@ TimeNs PixelIntegrator::advance(TimeNs end, const std::vector<Exposure*>& exposu
   Impl& m = *impl_;
   EVPOSE_CHECK(end > m.now);
   const TimeNs t0 = m.now, t1 = m.block_end(end);
-  Block block{t0, t1, exposures, m.glare(), {}, part_extents(m.prepared.scene, m.camera, m.path, t0, t1)};
+  Block block{t0, t1, exposures, m.glare(), {}, part_extents(m.prepared.scene, m.camera, m.path, t0, t1),
+              {}, {}};
   m.make_views(block);
   std::vector<float> nearest_before;
   for (const TileState& tile : m.tiles) nearest_before.push_back(tile.nearest);

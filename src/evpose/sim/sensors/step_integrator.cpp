@@ -15,6 +15,12 @@ LuminanceCurve line(float from, float to) {
 
 }  // namespace
 
+StepIntegrator::QuarterViews StepIntegrator::quarter_views(const SceneView& from, const SceneView& to) {
+  QuarterViews out;
+  for (int k = 0; k < kQuarters; ++k) out[k] = interpolate_view(from, to, 0.25 * (k + 1));
+  return out;
+}
+
 // The truth of the events that a pixel has appended.
 void StepIntegrator::annotate(std::size_t i, std::size_t first_event) {
   if (first_event == events.size()) return;
@@ -97,12 +103,11 @@ void StepIntegrator::advance_even(Uneven& uneven) {
 }
 
 void StepIntegrator::advance_uneven(const Uneven& uneven) {
-  std::array<std::array<float, kTilePixels>, kQuarters> quarters;  // luminance, by place in the list
+  std::array<std::array<float, kTilePixels>, kQuarters> between;  // luminance, by place in the list
   for (int k = 0; k < kQuarters; ++k) {
     const bool middle = k == 1;
     if (uneven.wanting[kQuarters] == 0 && !(middle && uneven.wanting[1] > 0)) continue;
-    const SceneView view = interpolate_view(views[0], views[1], 0.25 * (k + 1));
-    TileSampler::Again again(sampler, view);
+    TileSampler::Again again(sampler, quarters[k]);
     const auto wants = [&](std::size_t u) {
       return uneven.between[u] == kQuarters || (middle && uneven.between[u] == 1);
     };
@@ -111,7 +116,7 @@ void StepIntegrator::advance_uneven(const Uneven& uneven) {
     again.shade();
     std::size_t answer = 0;
     for (std::size_t u = 0; u < uneven.count; ++u)
-      if (wants(u)) quarters[k][u] = again.luminance(answer++);
+      if (wants(u)) between[k][u] = again.luminance(answer++);
   }
   for (std::size_t u = 0; u < uneven.count; ++u) {
     const std::size_t i = uneven.pixel[u];
@@ -123,7 +128,7 @@ void StepIntegrator::advance_uneven(const Uneven& uneven) {
     } else if (uneven.between[u] > 0) {
       curve.knots = 1;
       const int step = 4 / (uneven.between[u] + 1);
-      for (int k = step; k < 4; k += step) curve.add(0.25F * static_cast<float>(k), quarters[k - 1][u]);
+      for (int k = step; k < 4; k += step) curve.add(0.25F * static_cast<float>(k), between[k - 1][u]);
       curve.add(1, after.luminance[i]);
     }
     advance_along(i, curve);

@@ -15,12 +15,18 @@ namespace evpose::sim {
 
 /// Integrates every pixel of a tile from one sample to the next.
 struct StepIntegrator {
+  static constexpr int kQuarters = 3;
+  using QuarterViews = std::array<SceneView, kQuarters>;
+  /// At the quarters between two views.
+  static QuarterViews quarter_views(const SceneView& from, const SceneView& to);
+
   const PreparedScene& prepared;
   TileSampler& sampler;
   EventPixels& pixels;
   ImageSize size;
   const TilePlan& plan;
   std::array<std::reference_wrapper<const SceneView>, 2> views;  ///< of the two samples
+  const QuarterViews& quarters;                                  ///< between them
   TimeNs t0, t1;
   const TileSamples &before, &after;
   float glare;  ///< cd/m^2
@@ -31,7 +37,6 @@ struct StepIntegrator {
   void integrate();
 
  private:
-  static constexpr int kQuarters = 3;
   /// Pixels whose luminance changes much, and how often their texture is sampled in between.
   struct Uneven {
     std::size_t count = 0;

@@ -67,9 +67,11 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   return state;
 }
 
-void PoseSupervisor::take_verdict(double span_s) {
+void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   const PoseVerdict verdict = verifier_.verdict();
-  confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + span_s : 0;
+  // Without events there is no new evidence: a scene at rest does not confirm what was confirmed before.
+  const double confirming_s = accepted ? span_s : 0;
+  confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + confirming_s : 0;
   contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
   if (verdict == PoseVerdict::confirmed) contradicted_s_ = 0;
   if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
@@ -148,7 +150,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   // Errors that all contours share move pose and contours together: they belong to the covariance that is
   // told, not to how far a contour may lie from where it is looked for.
   const PoseUncertainty uncertainty(state, e.view);
-  take_verdict(e.span_s);
+  take_verdict(e.span_s, e.refused.empty());
   verified_ |= e.frames_confirm && !searching();
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
   Evidence evidence;

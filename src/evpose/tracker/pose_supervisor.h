@@ -90,7 +90,7 @@ class PoseSupervisor {
   bool verification_is_over(TimeNs t) const { return verifying() && t >= verify_until_; }
   bool found_pose_is_refuted(TimeNs t, const RegistrationResult& registration) const;
   bool pose_is_unconfirmed(TimeNs t, const RegistrationResult& registration) const;
-  void take_verdict(double span_s);
+  void take_verdict(double span_s, bool accepted);
   bool is_contradicted() const;
   bool is_contested() const;
   bool is_hopeless() const;

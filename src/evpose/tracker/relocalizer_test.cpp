@@ -132,6 +132,7 @@ class RelocalizerLaws : public ::testing::Test {
     int threads = 1, packet_ms = 1;
     PoorStart start = PoorStart(1);
     std::shared_ptr<const ContourMap> map = world_;
+    double silent_from_s = 1e9;  ///< since its start; no events from then on
   };
   /// What the tracker says from a poor start, for so long.
   std::vector<Update> track(const Run& run, double seconds) const {
@@ -145,8 +146,11 @@ class RelocalizerLaws : public ::testing::Test {
                    to_s = poor.t_s + 1e-3 * run.packet_ms * (i + 1);
       for (; imu <= run.packet_ms * (i + 1); ++imu)
         tracker->add_imu(test_flight::imu_at(poor.t_s + test_flight::kImuPeriod_s * imu));
-      const EventPacket packet = test_flight::make_packet(between(events_, from_s, to_s), from_s);
+      const bool silent = from_s - poor.t_s >= run.silent_from_s;
+      const EventPacket packet =
+          silent ? EventPacket{} : test_flight::make_packet(between(events_, from_s, to_s), from_s);
       if (!packet.empty()) tracker->add_events(packet);
+      if (silent) tracker->events_complete_until(time(to_s));
     }
     return updates;
   }
@@ -313,6 +317,20 @@ TEST_F(RelocalizerLaws, APoseFoundIsVerifiedBeforeItIsCalledTracking) {
   ASSERT_NE(found, updates.end());
   ASSERT_NE(tracking, updates.end());
   EXPECT_GE(to_seconds(tracking->t - found->t), Relocalizer::kVerify_s - 1e-6);
+}
+
+TEST_F(RelocalizerLaws, SilenceDoesNotConfirmAPoseThatWasFound) {
+  Run run;
+  const auto seen = track(run, 0.35);
+  const auto found = std::find_if_not(seen.begin(), seen.end(), searching);
+  ASSERT_NE(found, seen.end());
+  run.silent_from_s = to_seconds(found->t - time(run.start.t_s)) + 0.08;
+  const auto updates = track(run, run.silent_from_s + 0.4);
+  ASSERT_GT(updates.back().t, found->t + from_seconds(0.3));
+  for (const Update& u : updates) {
+    EXPECT_NE(u.health, Health::tracking);
+    EXPECT_GT(std::sqrt(u.covariance.topLeftCorner<3, 3>().trace()), 0.1) << to_seconds(u.t - found->t);
+  }
 }
 
 TEST_F(RelocalizerLaws, TheTrackersSettingsReachItsSearch) {

@@ -69,8 +69,8 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
 
 void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   const PoseVerdict verdict = verifier_.verdict();
-  // Without events there is no new evidence: a scene at rest does not confirm what was confirmed before.
-  const double confirming_s = accepted ? span_s : 0;
+  // Without events there is no new evidence: a scene at rest does not confirm a pose that was found.
+  const double confirming_s = accepted || !verifying() ? span_s : 0;
   confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + confirming_s : 0;
   contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
   if (verdict == PoseVerdict::confirmed) contradicted_s_ = 0;

@@ -33,7 +33,7 @@ class Flight:
 
 
 def flights():
-    out = [Flight(f"{s}, 1280x720", s, LARGE) for s in PLAIN]
+    out = [Flight(f"{s}, 1280x720", s, LARGE) for s in PLAIN + SPEEDS]
     out += [Flight(s, s, SMALL + LAMPS if s == "hdr_lights_off" else SMALL) for s in PLAIN + SPEEDS + OTHERS + HARD]
     out += [Flight(f"imu_1khz, {rate} Hz", "imu_1khz", rate_hz=rate) for rate in (100, 200, 300, 1000)]
     out += [Flight(f"{s}, map {mm} mm off", s, map_error_mm=mm) for mm in (3, 5) for s in PLAIN]

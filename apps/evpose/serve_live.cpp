@@ -286,7 +286,8 @@ Expected<int> serve(const ServeRequest& request) {
       {[&](const Update& u, TimeNs offset, Tracker& tracker) { outputs.add(u, offset, tracker); },
        [&](const std::string& why) { outputs.restarted(why); },
        [&](const std::string& what) { outputs.stalled(what); },
-       [&](const std::string& words) { outputs.notice(words); }, [&] { return outputs.whereabouts(); }});
+       [&](const std::string& words) { outputs.notice(words); }, [&] { return outputs.whereabouts(); },
+       [&](const std::string& poses) { outputs.ambiguous(poses); }});
   StreamQueue queue(config->queue);
   const InterruptGuard guard;
   std::signal(SIGHUP, ask_reset);

@@ -112,6 +112,11 @@ void Outputs::notice(const std::string& words) {
   if (viewer_) viewer_->notice(words);
 }
 
+void Outputs::ambiguous(const std::string& poses) {
+  notice("ambiguous: " + poses);
+  if (reporter_) reporter_->ambiguous(poses);
+}
+
 void Outputs::stalled(const std::string& what) {
   if (reporter_) reporter_->stalled(what);
 }

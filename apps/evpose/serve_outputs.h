@@ -49,6 +49,7 @@ class Outputs {
   void add(const Update& u, TimeNs data_to_monotonic, Tracker& tracker);
   void restarted(const std::string& why);
   void notice(const std::string& words);
+  void ambiguous(const std::string& poses);
   /// Where the autopilot's GPS and compass have the vehicle, if it said so just now.
   std::optional<TrackerStart> whereabouts() const;
   void stalled(const std::string& what);

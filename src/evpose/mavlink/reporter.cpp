@@ -243,6 +243,10 @@ void Reporter::stalled(const std::string& reason) {
   say(kError, reason);
 }
 
+void Reporter::ambiguous(const std::string& poses) {
+  say(kWarning, std::string(to_string(Health::ambiguous)) + ": " + poses);
+}
+
 void Reporter::tick(TimeNs now_ns) {
   if (now_ns >= next_heartbeat_) {
     next_heartbeat_ = now_ns + kHeartbeat;

@@ -62,6 +62,8 @@ class Reporter {
   void restarted(const std::string& reason);
   /// The stream is silent: as if lost, until the next update.
   void stalled(const std::string& reason);
+  /// A search beside has several poses that explain the events alike; none of them is sent.
+  void ambiguous(const std::string& poses);
   void receive(Bytes bytes, TimeNs now_ns);
   /// Heartbeat, clock and origin: call at least ten times a second.
   void tick(TimeNs now_ns);

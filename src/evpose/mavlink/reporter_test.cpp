@@ -43,6 +43,25 @@ TEST(MavlinkReporter, LongWordsComeInChunksThatJoinToTheWhole) {
   }
 }
 
+TEST(MavlinkReporter, PosesThatExplainTheEventsAlikeAreNamedAndNotSent) {
+  std::string said;
+  int texts = 0, others = 0;
+  Parser parser;
+  Reporter reporter({}, {}, [&](Bytes bytes) {
+    parser.parse(bytes, [&](const Frame& frame) {
+      const auto words = decode<Statustext>(frame);
+      if (!words) return void(++others);
+      ++texts;
+      EXPECT_EQ(words->severity, 4) << "a warning";
+      said.append(words->text.begin(), std::find(words->text.begin(), words->text.end(), '\0'));
+    });
+  });
+  reporter.ambiguous("2 poses explain the events alike: (1, 2, 3), (4, 5, 6)");
+  EXPECT_EQ(said, "evpose: ambiguous: 2 poses explain the events alike: (1, 2, 3), (4, 5, 6)");
+  EXPECT_EQ(texts, 2);
+  EXPECT_EQ(others, 0);
+}
+
 class VehiclePlaceLaws : public testing::Test {
  protected:
   VehiclePlaceLaws() {

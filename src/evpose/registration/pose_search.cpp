@@ -7,6 +7,7 @@
 #include <optional>
 #include <random>
 
+#include "evpose/core/keep_different.h"
 #include "evpose/registration/coarse_ranking.h"
 
 namespace evpose {
@@ -86,21 +87,6 @@ double image_motion_px(const Vector6d& step, double focal_px) {
 double image_motion_px(const Pose& a, const Pose& b, double focal_px) {
   const double turn = 2 * (a.q.conjugate() * b.q).vec().norm();
   return focal_px * ((a.p - b.p).norm() / kTypicalDepth_m + turn);
-}
-
-/// Sorts, best first, and keeps the first of those that are one pose.
-void keep_different(std::vector<PoseGuess>& guesses, std::size_t most, double focal_px) {
-  std::stable_sort(guesses.begin(), guesses.end(),
-                   [](const PoseGuess& a, const PoseGuess& b) { return a.score > b.score; });
-  std::vector<PoseGuess> out;
-  for (const PoseGuess& g : guesses) {
-    if (out.size() == most) break;
-    if (std::none_of(out.begin(), out.end(), [&](const PoseGuess& o) {
-          return image_motion_px(o.T_map_body, g.T_map_body, focal_px) < kDifferent_px;
-        }))
-      out.push_back(g);
-  }
-  guesses = std::move(out);
 }
 
 /// Normal equations of the distances between contours and edges at `pose`, weighted by a kernel of this
@@ -201,7 +187,10 @@ std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, co
   const double focal_px = view.camera.focal_px();
   std::vector<PoseGuess> guesses = draw_guesses(view, prior, covariance, seed);
   const PoseGuess first = guesses.front();
-  keep_different(guesses, kRefined, focal_px);
+  const auto same = [&](const PoseGuess& a, const PoseGuess& b) {
+    return image_motion_px(a.T_map_body, b.T_map_body, focal_px) < kDifferent_px;
+  };
+  keep_different(guesses, kRefined, same);
   guesses.push_back(first);
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
   const double evidence = static_cast<double>(view.points.size()) / kCorrelatedPoints;
@@ -213,7 +202,7 @@ std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, co
       const Vector6d off = g.T_map_body.minus(prior);
       g.score -= 0.5 * off.dot(information * off) / evidence;
     }
-    keep_different(guesses, kKept, focal_px);
+    keep_different(guesses, kKept, same);
   };
   refine(coarse, refine_reach_px());
   refine(view, kLastReach_px);

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "evpose/core/keep_different.h"
 #include "evpose/core/pose.h"
 
 namespace evpose {
@@ -155,18 +156,11 @@ std::vector<AttitudeGuess> grid(const AttitudeScore& score, const AttitudePrior&
   return out;
 }
 
-void keep_different(std::vector<AttitudeGuess>& guesses, double apart, std::size_t most) {
-  std::stable_sort(guesses.begin(), guesses.end(),
-                   [](const AttitudeGuess& a, const AttitudeGuess& b) { return a.score > b.score; });
-  std::vector<AttitudeGuess> out;
-  for (const AttitudeGuess& g : guesses) {
-    if (out.size() == most) break;
-    if (std::none_of(out.begin(), out.end(), [&](const AttitudeGuess& o) {
-          return g.q_map_body.angularDistance(o.q_map_body) < apart;
-        }))
-      out.push_back(g);
-  }
-  guesses = std::move(out);
+/// Attitudes nearer than this are one.
+auto nearer_than(double apart_rad) {
+  return [=](const AttitudeGuess& a, const AttitudeGuess& b) {
+    return b.q_map_body.angularDistance(a.q_map_body) < apart_rad;
+  };
 }
 
 }  // namespace
@@ -228,7 +222,7 @@ std::vector<AttitudeGuess> search_attitude(std::span<const EdgeLine> lines, cons
   if (directions.size() < 2 || planes.empty()) return {};
   const AttitudeScore score(planes, directions, prior);
   std::vector<AttitudeGuess> guesses = grid(score, prior);
-  keep_different(guesses, kStep_rad, kRefined);
+  keep_different(guesses, kRefined, nearer_than(kStep_rad));
   for (AttitudeGuess& g : guesses) {
     g.q_map_body = score.refined(g.q_map_body);
     g.score = score(g.q_map_body, 0);
@@ -237,7 +231,7 @@ std::vector<AttitudeGuess> search_attitude(std::span<const EdgeLine> lines, cons
     return heading_between(g.q_map_body, prior.heading_from) > prior.heading_within ||
            g.q_map_body.angularDistance(prior.heading_from) > prior.turned_within;
   });
-  keep_different(guesses, kDifferent_rad, most);
+  keep_different(guesses, most, nearer_than(kDifferent_rad));
   return guesses;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/core/keep_different.h"
 #include "evpose/registration/coarse_ranking.h"
 #include "evpose/relocalization/place_search.h"
 
@@ -37,19 +38,12 @@ VisibleSetConfig points_to_refine(VisibleSetConfig config) {
   return config;
 }
 
-void keep_different(std::vector<PoseGuess>& guesses, double apart_m, double apart_rad, std::size_t most) {
-  std::stable_sort(guesses.begin(), guesses.end(),
-                   [](const PoseGuess& a, const PoseGuess& b) { return a.score > b.score; });
-  std::vector<PoseGuess> out;
-  for (const PoseGuess& g : guesses) {
-    if (out.size() == most) break;
-    if (std::none_of(out.begin(), out.end(), [&](const PoseGuess& o) {
-          return (g.T_map_body.p - o.T_map_body.p).norm() < apart_m &&
-                 g.T_map_body.q.angularDistance(o.T_map_body.q) < apart_rad;
-        }))
-      out.push_back(g);
-  }
-  guesses = std::move(out);
+/// Poses nearer than these are one.
+auto nearer_than(double apart_m, double apart_rad) {
+  return [=](const PoseGuess& a, const PoseGuess& b) {
+    return (b.T_map_body.p - a.T_map_body.p).norm() < apart_m &&
+           b.T_map_body.q.angularDistance(a.T_map_body.q) < apart_rad;
+  };
 }
 
 }  // namespace
@@ -156,18 +150,18 @@ std::vector<PoseGuess> WideSearch::find(std::span<const FilteredEvent> events, c
       search_attitude(lines, camera_, T_body_cam.q, directions_, attitude, kAttitudes);
   std::vector<PoseGuess> guesses =
       search_places(lines, camera_, T_body_cam, *places_, box(prior), attitudes, kPlaces);
-  keep_different(guesses, kDifferent_m, kDifferent_rad, kRefined);
+  keep_different(guesses, kRefined, nearer_than(kDifferent_m, kDifferent_rad));
   const double reach_px = std::max(refine_reach_px(), kReach * camera_.focal_px());
   for (PoseGuess& g : guesses) {
     see_from_nearest_place(g.T_map_body * T_body_cam);
     g = refine(field, T_body_cam, g, reach_px);
   }
-  keep_different(guesses, kSame_m, kSame_rad, kKept);
+  keep_different(guesses, kKept, nearer_than(kSame_m, kSame_rad));
   for (PoseGuess& g : guesses) {
     see_from(g.T_map_body * T_body_cam);
     g = refine(field, T_body_cam, g, kLastReach_px);
   }
-  keep_different(guesses, kSame_m, kSame_rad, kKept);
+  keep_different(guesses, kKept, nearer_than(kSame_m, kSame_rad));
   return guesses;
 }
 

@@ -285,7 +285,7 @@ void Session::end_search() {
 void Session::mind_search() {
   std::erase_if(given_up_, [](const auto& r) { return r->ended(); });
   if (const std::string poses = recovery_ ? recovery_->take_ambiguous() : ""; !poses.empty())
-    hooks_.notice("ambiguous: " + poses);
+    hooks_.ambiguous(poses);
   if (auto found = recovery_ ? recovery_->take() : nullptr) {
     count_tracker();
     use(std::move(found));

@@ -46,6 +46,8 @@ class Session {
     std::function<void(const std::string& words)> notice;
     /// Where others have it, within some metres, and its heading if the sigma says so.
     std::function<std::optional<TrackerStart>()> whereabouts = {};
+    /// A search beside has several poses that explain the events alike: which, in words.
+    std::function<void(const std::string& poses)> ambiguous = [](const std::string&) {};
   };
 
   /// `start_at`: the data time of the start pose; unset: as soon as there are data.

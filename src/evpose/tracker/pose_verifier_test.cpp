@@ -89,6 +89,34 @@ TEST_F(PoseVerifierLaws, AMapThatIsWrongInOneDirectionIsContested) {
   EXPECT_EQ(verdict(map, Vector6d::Zero()), PoseVerdict::contested);
 }
 
+/// However many events lie on them: a wrong pose has some contours on edges of the image.
+TEST(PoseVerifierOfFewContours, ConfirmsByNoFewerThanTenPieces) {
+  constexpr int kPieces = 60;
+  std::vector<ContourSample> contours(kPieces);
+  for (int i = 0; i < kPieces; ++i) {
+    contours[i].pixel = {60 + 50 * (i % 10), 60 + 50 * (i / 10)};
+    contours[i].normal_px = i % 2 == 0 ? Eigen::Vector2d::UnitX() : Eigen::Vector2d::UnitY();
+    contours[i].speed_px_s = 300;
+    contours[i].segment = static_cast<std::uint32_t>(i);
+  }
+  const auto verdict = [&](int with_events) {
+    PoseVerifier verifier({640, 480}, kPieces, true);
+    std::vector<FilteredEvent> events;
+    for (int i = 0; i < with_events; ++i)
+      for (int k = 0; k < 3; ++k) {
+        FilteredEvent e{};
+        // Beside the sample's middle: it is looked 1.5 px along the contour.
+        e.x = static_cast<std::uint16_t>(contours[i].pixel.x() + 2 * contours[i].normal_px.y());
+        e.y = static_cast<std::uint16_t>(contours[i].pixel.y() + 2 * contours[i].normal_px.x());
+        events.push_back(e);
+      }
+    for (double t_s = 0; t_s < kFlight_s; t_s += kLook_s) verifier.add(events, contours, kUpdate_s, kLook_s);
+    return verifier.verdict();
+  };
+  EXPECT_EQ(verdict(9), PoseVerdict::open);
+  EXPECT_EQ(verdict(12), PoseVerdict::confirmed);
+}
+
 TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {
   EXPECT_EQ(verdict(world_, Vector6d::Zero(), true), PoseVerdict::open);
 }

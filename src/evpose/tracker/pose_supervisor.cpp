@@ -12,9 +12,12 @@ constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consist
 constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
 constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
 constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
-constexpr double kHopeless_s = 1;           // without a search
+constexpr double kContested_s = 0.2;  // of a pose that was verified: one direction may pass without events
+constexpr double kHopeless_s = 1;     // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
 constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
+// A pose that was right slides along the contours that are left.
+constexpr double kSlides_m_s = 0.3, kSlides_rad_s = 0.1;
 constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
 constexpr const char* kOneDirection =
@@ -80,18 +83,24 @@ void PoseSupervisor::take_verdict(double span_s, bool accepted) {
 
 bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }
 
-/// Contours of each direction have had events at some time once it is verified; some may pass without.
-bool PoseSupervisor::is_contested() const { return !verified_ && contested_s_ > kContradicted_s; }
+/// Contours of each direction have had events at some time once it is verified.
+bool PoseSupervisor::is_contested() const {
+  return contested_s_ > (verified_ ? kContested_s : kContradicted_s);
+}
 
 bool PoseSupervisor::is_hopeless() const {
   return searching() ? relocalizer_.has_tried_all() : !config_.on && contradicted_s_ > kHopeless_s;
 }
 
 Matrix6d PoseSupervisor::doubt() const {
+  double position_m = 0, rotation_rad = 0;
+  if (is_contradicted() || (!verified_ && (is_contested() || verifying())))
+    position_m = kDoubtPosition_m, rotation_rad = kDoubtRotation_rad;
+  else if (is_contested())
+    position_m = kSlides_m_s * contested_s_, rotation_rad = kSlides_rad_s * contested_s_;
   Matrix6d out = Matrix6d::Zero();
-  if (!is_contradicted() && !is_contested() && (verified_ || !verifying())) return out;
-  out.diagonal().head<3>().setConstant(kDoubtPosition_m * kDoubtPosition_m);
-  out.diagonal().tail<3>().setConstant(kDoubtRotation_rad * kDoubtRotation_rad);
+  out.diagonal().head<3>().setConstant(position_m * position_m);
+  out.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad);
   return out;
 }
 

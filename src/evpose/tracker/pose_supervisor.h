@@ -81,8 +81,8 @@ class PoseSupervisor {
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
   }
-  /// What is to be added to the pose's covariance while events contradict the pose, or while one is not
-  /// verified that was found or whose contours of one direction lie where no events are.
+  /// What is to be added to the pose's covariance while events contradict the pose, while one that was found
+  /// is not verified, or while its contours of one direction lie where no events are.
   Matrix6d doubt() const;
 
  private:

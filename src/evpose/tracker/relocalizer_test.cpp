@@ -310,7 +310,7 @@ TEST_F(RelocalizerLaws, ThreadsAndPacketsMakeNoDifferenceToASearch) {
 }
 
 TEST_F(RelocalizerLaws, APoseFoundIsVerifiedBeforeItIsCalledTracking) {
-  const auto updates = track({}, 0.35);
+  const auto updates = track({}, 0.5);
   const auto found = std::find_if_not(updates.begin(), updates.end(), searching);
   const auto tracking = std::find_if(updates.begin(), updates.end(),
                                      [](const Update& u) { return u.health == Health::tracking; });

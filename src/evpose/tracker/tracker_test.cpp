@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <new>
 #include <numbers>
+#include <optional>
 #include <random>
 
 #include "evpose/core/config.h"
@@ -78,11 +79,11 @@ class BadInput : public ::testing::Test {
     updates_.reserve(10000);
     constexpr int kStepsPerPacket = 4;
     constexpr double kStep_s = test_flight::EdgeEvents::kStep_s;
-    test_flight::EdgeEvents edges(world, camera);
+    test_flight::EdgeEvents edges(world, camera), later(later_world_ ? *later_world_ : world, camera);
     std::vector<test_flight::TimedEvent> events;
     for (int i = 0; kStep_s * i < seconds; ++i) {
       const double t = kStep_s * i;
-      edges.advance(t, t >= silent_from && t < silent_to, events);
+      (t < changes_s_ ? edges : later).advance(t, t >= silent_from && t < silent_to, events);
       if ((i + 1) % kStepsPerPacket != 0) continue;
       if (t < imu_ends_s_) tracker_->add_imu(test_flight::imu_at(t));
       const EventPacket packet = test_flight::make_packet(events, t - kStepsPerPacket * kStep_s);
@@ -115,6 +116,8 @@ class BadInput : public ::testing::Test {
   TrackerSetup setup_;
   TrackerConfig config_;
   double imu_ends_s_ = 1e9;
+  std::optional<ContourMap> later_world_;  ///< what there is from changes_s_ on
+  double changes_s_ = 1e9;
   std::unique_ptr<Tracker> tracker_;
   std::vector<Update> updates_;
   std::vector<std::string> reasons_;
@@ -200,6 +203,23 @@ TEST_F(BadInput, AMirroredMapIsNoticed) {
       EXPECT_TRUE(u.health != Health::tracking || error_m(u) < 5 * sigma_m(u)) << seed;
   }
   EXPECT_GE(noticed, static_cast<int>(kPlaces) - 3);  // boxes in a row are nearly the same mirrored
+}
+
+// As if the pose had slid along the edges that it sees best.
+TEST_F(BadInput, APoseThatWasConfirmedIsDoubtedWhereOneDirectionStaysWithoutEvents) {
+  setup_.map = std::make_shared<const ContourMap>(boxes());
+  later_world_ = boxes();
+  changes_s_ = 0.6;
+  for (ContourPoint& p : later_world_->points)
+    if (std::abs(p.tangent.y()) < 0.9F) p.position.y() -= 0.13F;
+  fly(*setup_.map, 2.0);
+  EXPECT_EQ(at(0.55).health, Health::tracking);
+  double doubted_sigma_m = 0;
+  for (const Update& u : updates_)
+    if (u.health == Health::degraded) doubted_sigma_m = std::max(doubted_sigma_m, sigma_m(u));
+  EXPECT_TRUE(said("degraded: not in this map, or far from the pose: contours of one direction lie"))
+      << all_reasons();
+  EXPECT_GT(doubted_sigma_m, 0.1);
 }
 
 TEST_F(BadInput, TheMapOfAnotherPlaceEndsLostAndIsNeverCalledTracking) {

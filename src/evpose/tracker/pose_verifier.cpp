@@ -29,7 +29,7 @@ constexpr float kLeastWay_px = 0.25F;  // in the looks: by a pixel in all
 constexpr double kFewestPieces = 20, kFewestEvents = 100;
 constexpr double kConfirmedRatio = 2.3;
 constexpr double kConfirmedRatioUnhidden = 1.9;         // contours behind surfaces have no events, but count
-constexpr double kLeastShare = 0.04;                    // a few contours that happen to fit do not confirm
+constexpr double kLeastShare = 0.04, kEnoughRatio = 4;  // a few contours that happen to fit do not confirm
 constexpr double kFewestExplained = 10;                 // pieces, whatever their share
 constexpr double kManyPieces = 30, kRatioOfMany = 2.5;  // whatever their share
 constexpr double kConfirmedShare = 0.2, kRatioOfShare = 1.4;     // where texture has events beside them
@@ -215,7 +215,7 @@ PoseVerdict PoseVerifier::judge() const {
   const double explained = e.explained * e.pieces;
   const bool agrees =
       (e.ratio > confirmed_ratio_ && e.explained > kLeastShare && explained > kFewestExplained) ||
-      (e.ratio > kRatioOfMany && explained > kManyPieces) ||
+      e.ratio > kEnoughRatio || (e.ratio > kRatioOfMany && explained > kManyPieces) ||
       (e.ratio > kRatioOfShare && e.explained > kConfirmedShare && explained > kFewestExplained);
   if (agrees) return e.contested ? PoseVerdict::contested : PoseVerdict::confirmed;
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;

@@ -89,8 +89,8 @@ TEST_F(PoseVerifierLaws, AMapThatIsWrongInOneDirectionIsContested) {
   EXPECT_EQ(verdict(map, Vector6d::Zero()), PoseVerdict::contested);
 }
 
-/// However many events lie on them: a wrong pose has some contours on edges of the image.
-TEST(PoseVerifierOfFewContours, ConfirmsByNoFewerThanTenPieces) {
+/// However many events lie on them.
+TEST(PoseVerifierOfFewContours, CountsThePiecesThatHaveEvents) {
   constexpr int kPieces = 60;
   std::vector<ContourSample> contours(kPieces);
   for (int i = 0; i < kPieces; ++i) {
@@ -99,7 +99,7 @@ TEST(PoseVerifierOfFewContours, ConfirmsByNoFewerThanTenPieces) {
     contours[i].speed_px_s = 300;
     contours[i].segment = static_cast<std::uint32_t>(i);
   }
-  const auto verdict = [&](int with_events) {
+  const auto evidence = [&](int with_events) {
     PoseVerifier verifier({640, 480}, kPieces, true);
     std::vector<FilteredEvent> events;
     for (int i = 0; i < with_events; ++i)
@@ -107,14 +107,18 @@ TEST(PoseVerifierOfFewContours, ConfirmsByNoFewerThanTenPieces) {
         FilteredEvent e{};
         // Beside the sample's middle: it is looked 1.5 px along the contour.
         e.x = static_cast<std::uint16_t>(contours[i].pixel.x() + 2 * contours[i].normal_px.y());
-        e.y = static_cast<std::uint16_t>(contours[i].pixel.y() + 2 * contours[i].normal_px.x());
+        e.y = static_cast<unsigned>(contours[i].pixel.y() + 2 * contours[i].normal_px.x()) & 0x7FFFU;
         events.push_back(e);
       }
     for (double t_s = 0; t_s < kFlight_s; t_s += kLook_s) verifier.add(events, contours, kUpdate_s, kLook_s);
-    return verifier.verdict();
+    return verifier.evidence();
   };
-  EXPECT_EQ(verdict(9), PoseVerdict::open);
-  EXPECT_EQ(verdict(12), PoseVerdict::confirmed);
+  for (const int with_events : {9, 12, 40}) {
+    const PoseEvidence e = evidence(with_events);
+    EXPECT_EQ(e.pieces, kPieces);
+    EXPECT_NEAR(e.explained * e.pieces, with_events, 1e-6);
+    EXPECT_GT(e.ratio, 10);
+  }
 }
 
 TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {

@@ -24,14 +24,7 @@ constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a 
 // neighbours support each other in the noise filter.
 constexpr float kInterestMargin_px = 2.5F;
 
-// Gate concentration.
-constexpr double kGateRim = 0.8;              // events beyond this share of the gate tell the density at it
-constexpr double kMemory_s = 0.05;            // of the sums, while many events come
-constexpr double kLongestMemory_s = 1;        // of the sums, while few events come
-constexpr double kEnoughWeight = 50;          // of events, from which on the concentration is believed
-constexpr double kLeastConcentration = 0.15;  // keeps the correction finite
-constexpr double kConsistent = 0.3;           // concentration of events that are of the contours
-
+constexpr double kGateRim = 0.8;          // events beyond this share of the gate tell the density at it
 constexpr std::uint32_t kProbeEvery = 4;  // calls after which a sample's owned area is probed again
 
 }  // namespace
@@ -63,21 +56,6 @@ EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConf
       index_(size, kHalfLength_px, kAmbiguity_px),
       contrast_(segments, config.contrast_threshold, config.trail_filter),
       trust_(config.judge_contours ? segments : 0) {}
-
-double EventRegistration::Concentration::value() const {
-  return sums.weight > 0 ? std::clamp(sums.slope(), kLeastConcentration, 1.0) : 1;
-}
-
-void EventRegistration::Concentration::decay(double span_s) {
-  const double keep = std::clamp(2 * kEnoughWeight / std::max(sums.weight, 1e-9),
-                                 std::exp(-span_s / kMemory_s), std::exp(-span_s / kLongestMemory_s));
-  sums *= keep;
-}
-
-/// Events spread evenly over the gates do not tell of contours: the pose is not where it is thought to be.
-bool EventRegistration::consistent() const {
-  return concentration_.sums.weight < kEnoughWeight || concentration_.value() >= kConsistent;
-}
 
 bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) const {
   const double steps = s.normal_side * contrast_.steps(s.segment);
@@ -207,7 +185,7 @@ void EventRegistration::add_event(std::int32_t band, float d, Sum* sum) {
   GateSums gate{w, w + 2 * w * (1 - w) * d * d * line.exponent, 0};
   if (std::abs(d) > kGateRim * line.gate) gate.at_gate = w * std::abs(d) / ((1 - kGateRim) * line.gate);
   sum->gate += gate;
-  concentration_.sums += gate;
+  concentration_.add(gate);
 }
 
 void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationResult* result) {
@@ -335,7 +313,9 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
   // Of a cell that is looked at now and then, an error that lasts is seen as often less.
   const double repeats =
       std::max(1.0, p.thinning.share() * config_.correlation_time_s / std::max(p.span_s, 1e-6));
-  const double correction = config_.gate_truncation_correction ? concentration_.value() : 1;
+  const bool corrected = config_.gate_truncation_correction;
+  const double correction = corrected ? concentration_.value() : 1;
+  const double gathered = corrected ? concentration_.share_of_information() : 1;
   double weight = 0, square = 0;
   offsets_.clear();
   for (std::size_t i = 0; i < p.samples.size(); ++i) {
@@ -353,7 +333,7 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
                                      (c.map_variance + c.delay_variance) / c.weight);
     const double borne_out =
         config_.judge_contours ? trust_.trust(p.samples[i].segment, concentration_.value()) : 1;
-    const double scale = borne_out * c.trust * own / (own + shared) / event_variance;
+    const double scale = gathered * borne_out * c.trust * own / (own + shared) / event_variance;
     if (c.trust < 0.5) result->other_motion += sum.events;
     const Vector6d& J = p.samples[i].jacobian;
     result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * correction * sum.weight);
@@ -391,8 +371,8 @@ RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   for (std::size_t i = 0; i < p.samples.size(); ++i)
     if (sums_[i].events > 0) clusters_[cluster_numbers_[i]] = {};
   result.points = static_cast<int>(p.samples.size());
-  result.gate_concentration = concentration_.sums.weight < kEnoughWeight ? 0 : concentration_.value();
-  result.consistent = consistent();
+  result.gate_concentration = concentration_.known() ? concentration_.value() : 0;
+  result.consistent = concentration_.consistent();
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "evpose/registration/contour_trust.h"
 #include "evpose/registration/contrast_memory.h"
 #include "evpose/registration/flow_monitor.h"
+#include "evpose/registration/gate_concentration.h"
 #include "evpose/registration/registration.h"
 
 namespace evpose {
@@ -89,13 +90,6 @@ class EventRegistration final : public Registration {
     int gate_net = 0, gate_all = 0;  ///< likewise in the gate, of both polarities; all
     int agree = 0, differ = 0;       ///< events in the gate that move as predicted, or not
   };
-  /// Derivative of the mean distance by an offset, from sums over events with exponential forgetting: 1 for
-  /// events that all lie near the contours, 0 for events spread evenly over the gates.
-  struct Concentration {
-    GateSums sums;
-    double value() const;
-    void decay(double span_s);
-  };
   struct Cluster {
     double weight = 0, map_variance = 0, delay_variance = 0, clutter = 0, trust = 1;
   };
@@ -115,7 +109,6 @@ class EventRegistration final : public Registration {
   void sum_information(const RegistrationProblem& problem, RegistrationResult* result);
   void mark_other_motion(const RegistrationProblem& problem);
   std::uint32_t cluster_of(const ContourSample& sample) const;
-  bool consistent() const;
   bool polarity_is_wrong(const ContourSample& sample, int sign) const;
   bool owns_probe(std::size_t sample, float half_span_us) const;
 
@@ -125,7 +118,7 @@ class EventRegistration final : public Registration {
   ContrastMemory contrast_;
   FlowMonitor flow_;
   ContourTrust trust_;
-  Concentration concentration_;
+  GateConcentration concentration_;
   // Of the last call, one for each sample; kept so that steady state allocates nothing.
   std::vector<AssociationBand> bands_;
   std::vector<std::uint8_t> asked_;  ///< 1: events on the sample's block are looked at

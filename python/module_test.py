@@ -223,9 +223,11 @@ class ModuleTest(unittest.TestCase):
                               env={"PYTHONPATH": str(MODULE), "MPLBACKEND": "Agg", "HOME": str(self.folder),
                                    "EVPOSE_RECORDING": str(self.folder), "EVPOSE_OUTPUT": str(out)}, timeout=100)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "from 30 mm beside: tracking",
-                      "smoothed: ", "the last is tracking"):
+        for words in ("events of 160x120 px", "tracking, 100 % of the updates", "smoothed: ", "the last is tracking"):
             self.assertIn(words, done.stdout)
+        found = re.search(r"from 30 mm beside: tracking after \d+ ms, ([0-9.]+) mm off", done.stdout)
+        self.assertIsNotNone(found, done.stdout)
+        self.assertLess(float(found[1]), 10)
         for name in ("recording", "track", "biases"):
             self.assertGreater((out / f"{name}.png").stat().st_size, 5000)
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/fusion/back_end.h"
 
+#include <Eigen/LU>
+
 #include "evpose/core/error.h"
 #include "evpose/fusion/ekf.h"
 #include "evpose/fusion/graph.h"
@@ -14,8 +16,15 @@ Eigen::MatrixXd BackEnd::seen_covariance() const {
 }
 
 void BackEnd::update(const SeenMeasurement& measurement) {
-  EVPOSE_CHECK(measurement.vector.size() == 6);
-  update(PoseInformation{measurement.information, measurement.vector}, {});
+  EVPOSE_CHECK(measurement.vector.size() == SeenMeasurement::kNumbers);
+  constexpr int v = SeenMeasurement::kVelocity;
+  const Eigen::MatrixXd& H = measurement.information;
+  const Eigen::Matrix3d prior = state().covariance.block<3, 3>(error_state::kV, error_state::kV);
+  const Eigen::Matrix3d of_velocity = H.block<3, 3>(v, v) + prior.inverse();
+  const Eigen::Matrix<double, 6, 3> gain = H.block<6, 3>(0, v) * of_velocity.inverse();
+  update(PoseInformation{H.topLeftCorner<6, 6>() - gain * H.block<3, 6>(v, 0),
+                         measurement.vector.head<6>() - gain * measurement.vector.segment<3>(v)},
+         {});
 }
 
 std::unique_ptr<BackEnd> make_back_end(MotionModel model, const FusionConfig& config, const ImuNoise& noise,

@@ -27,9 +27,10 @@ struct Calibration {
   bool frozen = true;  ///< too little motion to tell it from an error of the pose
 };
 
-/// The pose that is seen and the camera's numbers, measured together: near the present values their cost is
-/// d^T information d / 2 - vector^T d, with d = (pose as Pose::plus, numbers).
+/// The pose that is seen, the velocity and the camera's numbers, measured together: near the present values
+/// their cost is d^T information d / 2 - vector^T d, with d = (pose as Pose::plus, velocity, numbers).
 struct SeenMeasurement {
+  static constexpr int kVelocity = 6, kNumbers = 9;
   Eigen::MatrixXd information;
   Eigen::VectorXd vector;
 };
@@ -68,7 +69,7 @@ class BackEnd {
   virtual Matrix6d measured_covariance() const { return state().pose_covariance(); }
   /// The same with the velocity (3) and the camera's numbers, as far as these are states.
   virtual Eigen::MatrixXd seen_covariance() const;
-  /// A measurement without velocity. The numbers' part is for a framework in which they are states.
+  /// Takes what it tells of the pose; more where a framework can.
   virtual void update(const SeenMeasurement& measurement);
   virtual Calibration calibration() const { return {}; }
 

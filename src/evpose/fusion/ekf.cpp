@@ -46,11 +46,15 @@ void Ekf::update(const SeenMeasurement& measurement) {
   measurement_.start({measurement.information.topLeftCorner<6, 6>(), measurement.vector.head<6>()},
                      calibration_.pose_shifts(state()));
   measurement_.expect_shared_errors(SharedErrors::kCount);
-  if (const auto numbers = calibration_.intrinsics())
-    measurement_.add_block(*numbers, measurement.information, measurement.vector);
+  const BlockId velocity = filter_.add_copy(error_state::kV, 3);
+  std::vector<JointMeasurement::SizedBlock> blocks{{velocity, 3}};
+  const auto more = static_cast<int>(measurement.vector.size()) - SeenMeasurement::kNumbers;
+  if (more > 0) blocks.push_back({calibration_.intrinsics().value(), more});
+  measurement_.add_blocks(blocks, measurement.information, measurement.vector);
   filter_.update(measurement_);
   if (offsets_) offsets_->apply_corrections(filter_);
   apply_calibration();
+  filter_.remove_block(velocity);
 }
 
 void Ekf::apply_calibration() {

@@ -160,6 +160,26 @@ TEST(Ekf, EmptyMeasurementChangesNothing) {
   EXPECT_EQ(ekf.state().covariance, before);
 }
 
+TEST(Ekf, TheVelocityThatIsMeasuredWithThePoseIsThatOfTheClosedForm) {
+  FusionConfig config;
+  config.calibration.on = false;
+  Ekf ekf(StatePropagator(MotionModel::imu, config, ImuNoise{}));
+  ekf.start(0, some_state(), {0, 0, 0});
+  for (int k = 0; k < 20; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), ImuTrust::good);
+  const FusionState before = ekf.state();
+  std::srand(3);
+  const Eigen::Matrix<double, 9, 9> root = 30 * Eigen::Matrix<double, 9, 9>::Random();
+  const SeenMeasurement seen{root * root.transpose(), 1e-2 * Eigen::VectorXd::Random(9)};
+  Matrix15d information = before.covariance.inverse();
+  information.topLeftCorner<9, 9>() += seen.information;
+  const Matrix15d P = information.inverse();
+  ekf.update(seen);
+  const Vector15d moved = ekf.state().minus(before), expected = P.leftCols<9>() * seen.vector;
+  EXPECT_LT((moved - expected).norm(), 1e-6 * expected.norm());
+  EXPECT_LT((ekf.state().covariance - P).norm(), 1e-6 * P.norm());
+  EXPECT_EQ(ekf.filter().block_states(), 0);
+}
+
 /// Both ways of telling the filter what contours say of a camera with other numbers than given.
 TEST(Ekf, PoseAndNumbersMeasuredTogetherAreTheirContours) {
   FusionConfig config;
@@ -172,7 +192,7 @@ TEST(Ekf, PoseAndNumbersMeasuredTogetherAreTheirContours) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   PoseInformation pose;
-  SeenMeasurement all{Eigen::MatrixXd::Zero(11, 11), Eigen::VectorXd::Zero(11)};
+  SeenMeasurement all{Eigen::MatrixXd::Zero(14, 14), Eigen::VectorXd::Zero(14)};
   std::vector<ContourOffset> contours;
   for (int i = 0; i < 40; ++i) {
     ContourOffset c;
@@ -182,8 +202,8 @@ TEST(Ekf, PoseAndNumbersMeasuredTogetherAreTheirContours) {
     c.weight = 25;
     c.by_intrinsics = Eigen::RowVectorXd::NullaryExpr(5, [&] { return normal(random); });
     const Vector6d by_pose = c.by_pose(some_state().T_map_body.rotation());
-    Eigen::VectorXd row(11);
-    row << by_pose, c.by_intrinsics.transpose();
+    Eigen::VectorXd row(14);
+    row << by_pose, Eigen::Vector3d::Zero(), c.by_intrinsics.transpose();
     pose.information += c.weight * by_pose * by_pose.transpose();
     pose.vector += c.weight * c.offset_px * by_pose;
     all.information += c.weight * row * row.transpose();

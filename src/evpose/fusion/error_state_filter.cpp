@@ -57,6 +57,16 @@ void ErrorStateFilter::reset_block(BlockId id, const Eigen::VectorXd& sigma) {
   blocks_.diagonal().segment(s.at, s.size) = sigma.cwiseAbs2();
 }
 
+BlockId ErrorStateFilter::add_copy(int first, int size) {
+  const BlockId id = add_block(Eigen::VectorXd::Ones(size));
+  const int at = slot(id).at;
+  cross_.middleCols(at, size) = state_.covariance.middleCols(first, size);
+  blocks_.middleRows(at, size) = cross_.middleRows(first, size);
+  blocks_.middleCols(at, size) = blocks_.middleRows(at, size).transpose();
+  blocks_by_shared_.middleRows(at, size) = by_shared_.middleRows(first, size);
+  return id;
+}
+
 void ErrorStateFilter::set_covariance(BlockId a, BlockId b, const Eigen::MatrixXd& covariance) {
   const Slot &first = slot(a), &second = slot(b);
   EVPOSE_CHECK(covariance.rows() == first.size && covariance.cols() == second.size);

@@ -26,6 +26,9 @@ class ErrorStateFilter {
 
   /// A block of independent states of these standard deviations, correlated with nothing.
   BlockId add_block(const Eigen::VectorXd& sigma);
+  /// A block whose errors are those of `size` of the state's, from number `first` on: measured with the pose,
+  /// it tells of them. Does not follow them in time.
+  BlockId add_copy(int first, int size);
   /// Covariance of two blocks, or of one; both were added or reset just now.
   void set_covariance(BlockId a, BlockId b, const Eigen::MatrixXd& covariance);
   /// As if the block were removed and added anew.

@@ -74,15 +74,20 @@ void JointMeasurement::withdraw(const Vector6d& by_pose, double weight, double r
   vector_.head<6>() -= weight * residual * by_pose;
 }
 
-void JointMeasurement::add_block(BlockId id, const Eigen::MatrixXd& information,
-                                 const Eigen::VectorXd& vector) {
-  const auto n = static_cast<int>(vector.size()) - 6;
-  const Block here = blocks_[static_cast<std::size_t>(place_of(id, n))];
-  EVPOSE_CHECK(here.size == n);
-  information_.block(0, here.at, 6, n) += information.topRightCorner(6, n);
-  information_.block(here.at, 0, n, 6) += information.bottomLeftCorner(n, 6);
-  information_.block(here.at, here.at, n, n) += information.bottomRightCorner(n, n);
-  vector_.segment(here.at, n) += vector.tail(n);
+void JointMeasurement::add_blocks(std::span<const SizedBlock> blocks, const Eigen::MatrixXd& information,
+                                  const Eigen::VectorXd& vector) {
+  std::vector<int> place{0, 1, 2, 3, 4, 5};  // of what is told, among the measured errors
+  for (const SizedBlock& block : blocks) {
+    const Block here = blocks_[static_cast<std::size_t>(place_of(block.id, block.size))];
+    for (int i = 0; i < here.size; ++i) place.push_back(here.at + i);
+  }
+  EVPOSE_CHECK(vector.size() == static_cast<Eigen::Index>(place.size()));
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if (i >= 6) vector_(place[i]) += vector(static_cast<Eigen::Index>(i));
+    for (std::size_t j = i < 6 ? 6 : 0; j < place.size(); ++j)
+      information_(place[i], place[j]) +=
+          information(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  }
 }
 
 }  // namespace evpose

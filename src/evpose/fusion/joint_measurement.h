@@ -50,9 +50,14 @@ class JointMeasurement {
   /// Takes out a sample's share of the pose's own information and vector.
   void withdraw(const Vector6d& by_pose, double weight, double residual);
 
-  /// Adds what is known of one block together with the pose: information and vector of both, the pose first.
-  /// Its share of the pose's own is in there already.
-  void add_block(BlockId id, const Eigen::MatrixXd& information, const Eigen::VectorXd& vector);
+  /// Adds what is known of blocks together with the pose: information and vector of the pose and of these, in
+  /// this order. The pose's own part is in there already.
+  struct SizedBlock {
+    BlockId id;
+    int size;
+  };
+  void add_blocks(std::span<const SizedBlock> blocks, const Eigen::MatrixXd& information,
+                  const Eigen::VectorXd& vector);
 
   /// Room for this many errors that samples share and that are no states; after start().
   void expect_shared_errors(int count);

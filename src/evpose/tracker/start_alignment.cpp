@@ -284,18 +284,6 @@ StartAlignment::Trial StartAlignment::anneal(const SeenPrior& prior, const Begin
   return trial;
 }
 
-/// About the prior's mean. The velocity is left to the updates that follow.
-SeenMeasurement StartAlignment::without_velocity(const SeenPrior& prior, const Trial& trial) const {
-  const Eigen::VectorXd vector = trial.b + trial.H * trial.moved;
-  const Eigen::MatrixXd information = information_of(prior.covariance);
-  const std::array<int, 3> velocity{6, 7, 8};
-  std::vector<int> kept{0, 1, 2, 3, 4, 5};
-  for (int i = 9; i < vector.size(); ++i) kept.push_back(i);
-  const Eigen::Matrix3d of_velocity = trial.H(velocity, velocity) + information(velocity, velocity);
-  const Eigen::MatrixXd gain = trial.H(kept, velocity) * of_velocity.inverse();
-  return {trial.H(kept, kept) - gain * trial.H(velocity, kept), vector(kept) - gain * vector(velocity)};
-}
-
 bool StartAlignment::is_same(const Trial& a, const Trial& view) {
   const Eigen::VectorXd d = a.moved - view.moved;
   return d.dot(view.H * d) < kSameView * kSameView * static_cast<double>(d.size());
@@ -348,7 +336,7 @@ std::optional<SeenMeasurement> StartAlignment::align(const SeenPrior& prior, con
   if (adjusted_ != nullptr) adjusted_->set_correction(prior.numbers);
   intervals_.clear();
   if (!right) return {};
-  return without_velocity(prior, *best);
+  return SeenMeasurement{best->H, best->b + best->H * best->moved};  // about the prior's mean
 }
 
 }  // namespace evpose

@@ -52,8 +52,9 @@ class StartAlignment {
     intervals_.add(events, now_us, motion, angular_rate);
   }
   bool has_enough() const { return intervals_.duration_s() >= kDuration_s; }
-  /// What the events added so far say of pose and numbers about the prior's mean. None: no view was found at
-  /// which they gather at the contours; other events are then waited for. Changes the camera's correction.
+  /// What the events added so far say of pose, velocity and numbers about the prior's mean. None: no view was
+  /// found at which they gather at the contours; other events are then waited for. Changes the camera's
+  /// correction.
   std::optional<SeenMeasurement> align(const SeenPrior& prior, const Pose& T_body_cam);
 
  private:
@@ -95,7 +96,6 @@ class StartAlignment {
   static bool is_same(const Trial& a, const Trial& view);
   static bool is_alone(std::span<const Trial> trials, const Trial& view);
   static double agreement(std::span<const Trial> trials, const Trial& view);
-  SeenMeasurement without_velocity(const SeenPrior& prior, const Trial& trial) const;
 
   HypothesisMotion motion_;
   const ContourIndex& index_;

@@ -44,8 +44,17 @@ struct Flown {
   Health health = Health::waiting;
 };
 
+StartState at_truth() {
+  StartState out;
+  out.t = kStart_ns;
+  out.T_map_body = test_flight::pose_at(0);
+  out.velocity = test_flight::velocity_at(0);
+  return out;
+}
+
 /// 0.4 s with this calibration given; `stated`: what it is said to be.
-Flown fly(const Calibrated& given, const std::optional<CalibrationSigma>& stated) {
+Flown fly(const Calibrated& given, const std::optional<CalibrationSigma>& stated,
+          const StartState& start = at_truth(), const TrackerConfig& config = {}) {
   static const auto map = std::make_shared<const ContourMap>(test_flight::boxes());
   static const auto camera = test_flight::make_flight_camera();
   TrackerSetup setup;
@@ -55,11 +64,7 @@ Flown fly(const Calibrated& given, const std::optional<CalibrationSigma>& stated
   setup.calibration_sigma = stated;
   setup.imu_noise.rate_hz = 1000;
   setup.map = map;
-  StartState start;
-  start.t = kStart_ns;
-  start.T_map_body = test_flight::pose_at(0);
-  start.velocity = test_flight::velocity_at(0);
-  auto tracker = *Tracker::create(setup, TrackerConfig{}, start);
+  auto tracker = *Tracker::create(setup, config, start);
   Flown out;
   tracker->on_update([&](const Update& u) {
     const Pose truth = test_flight::pose_at(to_seconds(u.t - kStart_ns));
@@ -106,6 +111,28 @@ TEST(StartAlignment, WhatIsKnownStaysAsGiven) {
   const Flown known = fly({}, CalibrationSigma::known(kTrue)), believed = fly({}, std::nullopt);
   EXPECT_EQ(known.camera_m, believed.camera_m);
   EXPECT_EQ(known.nees, believed.nees);
+}
+
+TEST(StartAlignment, FindsAPoorStartOfAKnownCameraThatFlies) {
+  TrackerConfig config;
+  config.fusion.start_position_sigma_m = 0.015;
+  config.fusion.start_rotation_sigma_rad = 0.003;
+  config.fusion.start_velocity_sigma_m_s = 1;
+  for (unsigned run = 0; run < 8; ++run) {
+    std::mt19937 random(60 + run);
+    std::normal_distribution<double> normal;
+    Vector6d off;
+    for (int i = 0; i < 6; ++i)
+      off(i) = normal(random) *
+               (i < 3 ? config.fusion.start_position_sigma_m : config.fusion.start_rotation_sigma_rad);
+    StartState start = at_truth();
+    start.T_map_body = start.T_map_body.plus(off);
+    start.velocity.setZero();
+    const Flown flown = fly({}, CalibrationSigma::known(kTrue), start, config);
+    EXPECT_EQ(flown.health, Health::tracking) << run;
+    EXPECT_LT(1e3 * flown.camera_m, 5) << run;
+    EXPECT_LT(flown.nees, 5) << run;
+  }
 }
 
 }  // namespace

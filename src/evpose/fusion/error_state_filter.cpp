@@ -61,8 +61,9 @@ BlockId ErrorStateFilter::add_copy(int first, int size) {
   const BlockId id = add_block(Eigen::VectorXd::Ones(size));
   const int at = slot(id).at;
   cross_.middleCols(at, size) = state_.covariance.middleCols(first, size);
-  blocks_.middleRows(at, size) = cross_.middleRows(first, size);
-  blocks_.middleCols(at, size) = blocks_.middleRows(at, size).transpose();
+  const Eigen::MatrixXd rows = cross_.middleRows(first, size);
+  blocks_.middleRows(at, size) = rows;
+  blocks_.middleCols(at, size) = rows.transpose();
   blocks_by_shared_.middleRows(at, size) = by_shared_.middleRows(first, size);
   return id;
 }

@@ -98,9 +98,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const double sigma_px = PoseUncertainty(fusion_->state(), typical_view()).separate_px();
   supervisor_.start(fusion_->state(), sigma_px);
-  const CalibrationConfig& c = config.fusion.calibration;
-  const bool exact = !c.intrinsics && !c.rotation && !c.translation;
-  if (config.frames.use != FrameUse::alone && (!exact || sigma_px > StartAlignment::kNeededAbove_px))
+  if (aligns_first_view(config, sigma_px))
     start_alignment_.emplace(
         RelocalizerScene{map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                          config.visible, config.event_registration},

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "evpose/registration/contrast_memory.h"
+#include "evpose/tracker/start_alignment.h"
 
 namespace evpose {
 namespace {
@@ -82,6 +83,14 @@ Status check_start(const ContourMap& map, const StartState& start, double far_m)
                       " m off the map, which is seen up to ", far_m, " m"),
                  "check that map and start pose share one frame (frames.T_map_world in recording.yaml)"};
   return {};
+}
+
+bool aligns_first_view(const TrackerConfig& config, double sigma_px) {
+  constexpr double kKnownVelocity_m_s = 0.2;  // 1 sigma; from then on the updates find it
+  const CalibrationConfig& c = config.fusion.calibration;
+  const bool poor_start = sigma_px > StartAlignment::kNeededAbove_px &&
+                          config.fusion.start_velocity_sigma_m_s > kKnownVelocity_m_s;
+  return config.frames.use != FrameUse::alone && (c.intrinsics || c.rotation || c.translation || poor_start);
 }
 
 bool lens_is_guessed(const TrackerSetup& setup, const FusionConfig& fusion) {

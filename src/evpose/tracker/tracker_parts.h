@@ -36,6 +36,10 @@ Status check_start(const ContourMap& map, const StartState& start, double far_m)
 /// intrinsics of which nothing is stated count as known.
 void choose_states(const TrackerSetup& setup, FusionConfig& fusion);
 
+/// Contours may lie further off at the start than the tracker's gate reaches: by the calibration, or by
+/// `sigma_px` of the pose while nobody knows where it is going. After choose_states().
+bool aligns_first_view(const TrackerConfig& config, double sigma_px);
+
 /// The lens is not known well, and choose_states() leaves it out.
 bool lens_is_guessed(const TrackerSetup& setup, const FusionConfig& fusion);
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "evpose/camera/calibration_sigma.h"
 
 namespace evpose {
@@ -86,6 +88,24 @@ TEST(AdjustedCamera, OrdinarySigmasHaveTheOrderOfTheNumbers) {
   }
   EXPECT_DOUBLE_EQ(CalibrationSigma{}.of_intrinsics(kCameras[1])(7), 5e-4);
   EXPECT_DOUBLE_EQ(CalibrationSigma{}.of_intrinsics(kCameras[1])(8), 0.02);
+}
+
+TEST(AdjustedCamera, TheRatioOfFocalLengthsIsKnownWhateverTheirSigma) {
+  const CameraIntrinsics& c = kCameras[1];
+  const auto ratio_sigma = [&](double x, double y) {
+    CalibrationSigma stated;
+    stated.intrinsics = {x * c.fx, y * c.fy, 1, 1};
+    const double r = stated.of_correlation(c)(0, 1);
+    return std::sqrt(x * x + y * y - 2 * r * x * y);
+  };
+  EXPECT_NEAR(ratio_sigma(3e-3, 3e-3), 1e-3, 1e-12);
+  EXPECT_NEAR(ratio_sigma(1e-3, 1.5e-3), 1e-3, 1e-12);
+  EXPECT_NEAR(ratio_sigma(2e-4, 2e-4), std::sqrt(8e-8), 1e-12) << "no more than what is stated";
+  EXPECT_EQ(CalibrationSigma::known(c).of_correlation(c)(0, 1), 0);
+  CalibrationSigma independent;
+  independent.correlation = Eigen::MatrixXd::Identity(4 + static_cast<Eigen::Index>(c.distortion.size()),
+                                                      4 + static_cast<Eigen::Index>(c.distortion.size()));
+  EXPECT_EQ(independent.of_correlation(c)(0, 1), 0);
 }
 
 }  // namespace

@@ -8,6 +8,9 @@ namespace {
 
 /// Of an ordinary calibration; the focal lengths' are relative.
 constexpr double kFocal = 3e-3, kCentre_px = 1, kFirstRadial = 0.01, kRadial = 0.02, kTangential = 5e-4;
+/// Of the ratio of both focal lengths, relative: pixels are square, and whatever a calibration takes for a
+/// longer lens lengthens both.
+constexpr double kAspect = 1e-3;
 
 Eigen::VectorXd ordinary(const CameraIntrinsics& c) {
   Eigen::VectorXd sigma(4 + static_cast<Eigen::Index>(c.distortion.size()));
@@ -16,6 +19,12 @@ Eigen::VectorXd ordinary(const CameraIntrinsics& c) {
   if (c.distortion_model == "radtan") sigma.segment<2>(6).setConstant(kTangential);
   if (c.distortion_model == "ds") sigma.tail<2>().setConstant(kFirstRadial);
   return sigma;
+}
+
+/// Of errors of fx and fy that are as large as this, relative.
+double correlation_of_focal_lengths(double x, double y) {
+  constexpr double kMost = 0.999;
+  return x > 0 && y > 0 ? std::clamp((x * x + y * y - kAspect * kAspect) / (2 * x * y), 0.0, kMost) : 0;
 }
 
 }  // namespace
@@ -32,6 +41,10 @@ CalibrationSigma CalibrationSigma::known(const CameraIntrinsics& camera) {
 Eigen::MatrixXd CalibrationSigma::of_correlation(const CameraIntrinsics& camera) const {
   const auto n = 4 + static_cast<Eigen::Index>(camera.distortion.size());
   Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n + 7, n + 7);
+  if (!correlation) {
+    const Eigen::VectorXd sigma = of_intrinsics(camera);
+    out(0, 1) = out(1, 0) = correlation_of_focal_lengths(sigma(0) / camera.fx, sigma(1) / camera.fy);
+  }
   if (correlation && (correlation->rows() == n || correlation->rows() == n + 7))
     out.topLeftCorner(correlation->rows(), correlation->rows()) = *correlation;
   return out;

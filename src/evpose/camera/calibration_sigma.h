@@ -18,7 +18,7 @@ struct CalibrationSigma {
   std::optional<Eigen::Vector3d> translation_m;   ///< of the camera in the body, along the body's axes
   std::optional<double> time_s;                   ///< of the IMU's clock against the camera's
   /// Correlation of these errors, in the order above: n intrinsics with distortion, then 3 + 3 + 1; without
-  /// an IMU n alone. Unset: they are independent.
+  /// an IMU n alone. Unset: they are independent, but for the focal lengths, whose ratio is known to 0.1 %.
   std::optional<Eigen::MatrixXd> correlation;
 
   /// All zero.

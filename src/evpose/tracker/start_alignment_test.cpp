@@ -29,7 +29,10 @@ Calibrated drawn(std::mt19937& random) {
   };
   const CalibrationSigma ordinary;
   Calibrated out;
-  const Eigen::VectorXd numbers = draw(ordinary.of_intrinsics(kTrue));
+  const Eigen::VectorXd sigma = ordinary.of_intrinsics(kTrue);
+  const Eigen::Index n = sigma.size();
+  const Eigen::MatrixXd R = ordinary.of_correlation(kTrue).topLeftCorner(n, n);
+  const Eigen::VectorXd numbers = sigma.asDiagonal() * (R.llt().matrixL() * draw(Eigen::VectorXd::Ones(n)));
   CameraIntrinsics& c = out.intrinsics;
   c.fx += numbers(0), c.fy += numbers(1), c.cx += numbers(2), c.cy += numbers(3);
   for (std::size_t i = 0; i < 4; ++i) c.distortion[i] += numbers(4 + static_cast<Eigen::Index>(i));

@@ -115,7 +115,7 @@ void choose_states(const TrackerSetup& setup, FusionConfig& fusion) {
   if (!setup.intrinsics || lens_is_guessed(setup, fusion)) return;
   c.start_intrinsics_sigma = sigma.of_intrinsics(*setup.intrinsics);
   c.intrinsics = (c.start_intrinsics_sigma.array() > 0).any();
-  if (sigma.correlation) c.start_correlation = sigma.of_correlation(*setup.intrinsics);
+  c.start_correlation = sigma.of_correlation(*setup.intrinsics);
 }
 
 }  // namespace evpose

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "evpose/core/geodesy.h"
+#include "evpose/io/files/test_files.h"
+#include "evpose/io/maps/map_h5.h"
+#include "evpose/run/kept_places.h"
 #include "evpose/run/plausibility.h"
 #include "evpose/run/progress.h"
 #include "evpose/run/start.h"
@@ -152,6 +155,31 @@ TEST_F(StartByGps, SaysWhatIsWrong) {
   EXPECT_NE(start("gps:47.4,8.5,412").error().line().find("not placed"), std::string::npos);
   recording_.has_imu = false;
   EXPECT_NE(start("gps:47.4,8.5,412").error().line().find("no IMU"), std::string::npos);
+}
+
+TEST(KeptPlaces, ThoseOfAMapThatWasChangedAreToldAndNotUsed) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "map.h5";
+  ASSERT_TRUE(write_map_h5(path, box(8)).ok());
+  const ContourMap map = read_map_h5(path).value();
+  std::vector<Error> findings;
+  const auto none = kept_places(path, map, findings);
+  EXPECT_TRUE(none.ok() && !*none);
+  const PlaceTable places{
+      view_fingerprint(map),     0.1,  40, 0.17, {Eigen::Vector3d(0, 1, 2), Eigen::Vector3d(3, 4, 5)},
+      {4, PlaceTable::kNoPlace}, {0xA}};
+  ASSERT_TRUE(write_map_h5(path, map, "", {}, &places).ok());
+  const auto kept = kept_places(path, map, findings);
+  EXPECT_TRUE(kept.ok() && *kept);
+  EXPECT_TRUE(findings.empty());
+  ContourMap changed = map;
+  changed.points.front().position.x() += 0.01F;
+  const auto of_before = kept_places(path, changed, findings);
+  EXPECT_TRUE(of_before.ok() && !*of_before);
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].where, path);
+  EXPECT_NE(findings[0].what.find("before it was changed"), std::string::npos);
+  EXPECT_NE(findings[0].fix.find("evpose map index"), std::string::npos);
 }
 
 }  // namespace

@@ -11,7 +11,6 @@ namespace {
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
 constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
 constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
-constexpr double kFoundExplained = 10;      // pieces of contour: a few agree wherever it is
 constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
 constexpr double kContested_s = 0.2;  // of a pose that was verified: one direction may pass without events
 constexpr double kHopeless_s = 1;     // without a search
@@ -72,11 +71,7 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
 }
 
 void PoseSupervisor::take_verdict(double span_s, bool accepted) {
-  PoseVerdict verdict = verifier_.verdict();
-  if (verdict == PoseVerdict::confirmed && verifying()) {
-    const PoseEvidence e = verifier_.evidence();
-    if (e.explained * e.pieces < kFoundExplained) verdict = PoseVerdict::open;
-  }
+  const PoseVerdict verdict = verifying() ? verifier_.verdict_of_found() : verifier_.verdict();
   // Without events there is no new evidence: a scene at rest does not confirm a pose that was found.
   const double confirming_s = accepted || !verifying() ? span_s : 0;
   confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + confirming_s : 0;

@@ -221,4 +221,10 @@ PoseVerdict PoseVerifier::judge() const {
   return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
 }
 
+PoseVerdict PoseVerifier::verdict_of_found() const {
+  if (verdict_ != PoseVerdict::confirmed) return verdict_;
+  const PoseEvidence e = evidence();
+  return e.explained * e.pieces < kFewestExplained ? PoseVerdict::open : verdict_;
+}
+
 }  // namespace evpose

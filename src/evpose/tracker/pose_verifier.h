@@ -51,6 +51,8 @@ class PoseVerifier {
 
   PoseEvidence evidence() const;
   PoseVerdict verdict() const { return verdict_; }
+  /// The same of a pose that was chosen among many because contours agree: a few do wherever it is.
+  PoseVerdict verdict_of_found() const;
 
  private:
   static constexpr std::size_t kDecoys = 4;

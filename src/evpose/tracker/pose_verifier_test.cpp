@@ -90,7 +90,7 @@ TEST_F(PoseVerifierLaws, AMapThatIsWrongInOneDirectionIsContested) {
 }
 
 /// However many events lie on them.
-TEST(PoseVerifierOfFewContours, CountsThePiecesThatHaveEvents) {
+TEST(PoseVerifierOfFewContours, ConfirmAPoseThatWasGivenButNotOneThatWasFound) {
   constexpr int kPieces = 60;
   std::vector<ContourSample> contours(kPieces);
   for (int i = 0; i < kPieces; ++i) {
@@ -99,7 +99,7 @@ TEST(PoseVerifierOfFewContours, CountsThePiecesThatHaveEvents) {
     contours[i].speed_px_s = 300;
     contours[i].segment = static_cast<std::uint32_t>(i);
   }
-  const auto evidence = [&](int with_events) {
+  const auto looked_at = [&](int with_events) {
     PoseVerifier verifier({640, 480}, kPieces, true);
     std::vector<FilteredEvent> events;
     for (int i = 0; i < with_events; ++i)
@@ -111,13 +111,17 @@ TEST(PoseVerifierOfFewContours, CountsThePiecesThatHaveEvents) {
         events.push_back(e);
       }
     for (double t_s = 0; t_s < kFlight_s; t_s += kLook_s) verifier.add(events, contours, kUpdate_s, kLook_s);
-    return verifier.evidence();
+    return verifier;
   };
   for (const int with_events : {9, 12, 40}) {
-    const PoseEvidence e = evidence(with_events);
+    const PoseVerifier verifier = looked_at(with_events);
+    const PoseEvidence e = verifier.evidence();
     EXPECT_EQ(e.pieces, kPieces);
     EXPECT_NEAR(e.explained * e.pieces, with_events, 1e-6);
     EXPECT_GT(e.ratio, 10);
+    EXPECT_EQ(verifier.verdict(), PoseVerdict::confirmed) << with_events;
+    EXPECT_EQ(verifier.verdict_of_found(), with_events < 10 ? PoseVerdict::open : PoseVerdict::confirmed)
+        << with_events;
   }
 }
 

@@ -23,9 +23,9 @@ struct SeenPrior {
   Eigen::MatrixXd covariance;          ///< of pose (as Pose::plus), velocity, numbers
 };
 
-/// Aligns the first view of a camera whose calibration is uncertain. Contours then lie up to several pixels
-/// from where they are expected, further than the tracker's gate reaches, and not all by the same motion: an
-/// error of the focal length moves the rim alone. So it is first looked up how many events lie at each
+/// Aligns the first view of a camera whose calibration is uncertain, or whose start is poorly known in pose and
+/// velocity. Contours then lie up to several pixels from where they are expected, further than the tracker's
+/// gate reaches, and not all by the same motion: an error of the focal length moves the rim alone. So it is first looked up how many events lie at each
 /// distance across each contour (ContourProfiles), and which errors of the prior would put the contours at
 /// most events. From several of these the events of the first moments are looked at again and again, at their
 /// own times and under gates that close from two pixels to the tracker's (graduated non-convexity), for the

@@ -283,7 +283,7 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   contours_.choose(found->nav.T_map_body);
 }
 
-/// While the first view of a camera whose calibration is uncertain is aligned, nothing else is measured.
+/// While the first view is aligned, nothing else is measured.
 /// True: it was so in this update.
 bool Tracker::align_start(TimeNs t, const ImuIncrement& moved) {
   if (!start_alignment_ || supervisor_.searching()) return false;

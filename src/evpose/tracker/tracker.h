@@ -101,8 +101,7 @@ class Tracker {
 
   /// The pose is being searched, and nothing measured meanwhile.
   bool searching() const { return supervisor_.searching(); }
-  /// The first view of a camera whose calibration is uncertain is to be aligned, each try of which takes a
-  /// fifth of a second of a core.
+  /// The first view is to be aligned, each try of which takes a fifth of a second of a core.
   bool aligns_start() const { return start_alignment_.has_value(); }
   /// It has to be searched, and is not: relocalization.on is off, or search_no_more() was called.
   bool needs_search() const { return supervisor_.needs_search(); }

@@ -23,17 +23,17 @@ struct SeenPrior {
   Eigen::MatrixXd covariance;          ///< of pose (as Pose::plus), velocity, numbers
 };
 
-/// Aligns the first view of a camera whose calibration is uncertain, or whose start is poorly known in pose and
-/// velocity. Contours then lie up to several pixels from where they are expected, further than the tracker's
-/// gate reaches, and not all by the same motion: an error of the focal length moves the rim alone. So it is first looked up how many events lie at each
-/// distance across each contour (ContourProfiles), and which errors of the prior would put the contours at
-/// most events. From several of these the events of the first moments are looked at again and again, at their
-/// own times and under gates that close from two pixels to the tracker's (graduated non-convexity), for the
-/// pose, the velocity and the camera's numbers together. What gathers most events at the contours is taken,
-/// if most starting points lead there, or the events are many and some do, or no other view has nearly as
-/// many, or the events that follow confirm it. Errors that the events of one edge share, the map's among
-/// them, are eliminated with a variance of their own for each edge (Student-t), so that the covariance is one
-/// that single disturbed edges do not mislead.
+/// Aligns the first view of a camera whose calibration is uncertain, or whose start is poorly known in pose
+/// and velocity. Contours then lie up to several pixels from where they are expected, further than the
+/// tracker's gate reaches, and not all by the same motion: an error of the focal length moves the rim alone.
+/// So it is first looked up how many events lie at each distance across each contour (ContourProfiles), and
+/// which errors of the prior would put the contours at most events. From several of these the events of the
+/// first moments are looked at again and again, at their own times and under gates that close from two pixels
+/// to the tracker's (graduated non-convexity), for the pose, the velocity and the camera's numbers together.
+/// What gathers most events at the contours is taken, if most starting points lead there, or the events are
+/// many and some do, or no other view has nearly as many, or the events that follow confirm it. Errors that
+/// the events of one edge share, the map's among them, are eliminated with a variance of their own for each
+/// edge (Student-t), so that the covariance is one that single disturbed edges do not mislead.
 class StartAlignment {
  public:
   /// Worth its time where contours are expected to lie further off than this, px (root mean square).

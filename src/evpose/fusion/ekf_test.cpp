@@ -245,7 +245,8 @@ struct SharedErrorsNees {
   double own = 0, reported = 0;
 };
 
-SharedErrorsNees fly_with_shared_errors(double offset_sigma_px, double map_sigma_m) {
+SharedErrorsNees fly_with_shared_errors(double offset_sigma_px, double map_sigma_m,
+                                        double concentration = 0) {
   std::mt19937 random(6);
   std::normal_distribution<double> normal;
   const StatePropagator propagator(MotionModel::constant_velocity, FusionConfig{}, ImuNoise{});
@@ -265,6 +266,7 @@ SharedErrorsNees fly_with_shared_errors(double offset_sigma_px, double map_sigma
       for (ContourOffset& c : contours) {
         const Vector6d by_pose = c.by_pose(ekf.state().nav.T_map_body.rotation());
         c.sigma_m = map_sigma_m;
+        c.concentration = concentration;
         pose.information += c.weight * by_pose * by_pose.transpose();
         pose.vector += c.weight * c.offset_px * by_pose;
       }
@@ -291,6 +293,15 @@ TEST(Ekf, ReportsACovarianceThatHoldsWithAMapWhoseFacesAreMisplaced) {
   EXPECT_GT(nees.own, 20);
   EXPECT_GT(nees.reported, 0.7);
   EXPECT_LT(nees.reported, 1.2);
+}
+
+TEST(Ekf, ReportsACovarianceThatHoldsWhereHalfOfTheEventsAreOfNoContour) {
+  for (const SharedErrorsNees& nees : {fly_with_shared_errors(1.5 * 0.08, 0, 0.5),
+                                       fly_with_shared_errors(3 * std::hypot(0.08, 0.6), 2e-3, 0.5)}) {
+    EXPECT_GT(nees.own, 4);
+    EXPECT_GT(nees.reported, 0.7);
+    EXPECT_LT(nees.reported, 1.2);
+  }
 }
 
 TEST(Ekf, ConstantVelocityLearnsTwistFromPosesAlone) {

@@ -13,14 +13,14 @@ namespace {
 constexpr double kDelay_s = 2e-3, kOffset_px = 0.08;
 constexpr double kOfMap = 3;  // the offset of a built map's contours, in sigmas that the map states
 // Texture beside the contours moves along with them: the fewer events are of contours, the further it draws
-// their mean.
-constexpr double kClear = 0.6;  // concentration on which the offset was chosen
+// their mean. Concentrations on which the offsets were chosen, of true contours and of a built map's.
+constexpr double kClear = 0.6, kClearOfMap = 0.75;
 constexpr double kLeastConcentration = 0.15;
 
-/// By how much the offset of a filter's update is larger than where few events are of anything but contours.
-double by_clutter(double concentration) {
+/// By how much the offset of a filter's update is larger than at the concentration `clear`.
+double by_clutter(double concentration, double clear) {
   const auto clutter = [](double share) { return (1 - share) / std::max(share, kLeastConcentration); };
-  return concentration > 0 ? std::max(1.0, clutter(concentration) / clutter(kClear)) : 1;
+  return concentration > 0 ? std::max(1.0, clutter(concentration) / clutter(clear)) : 1;
 }
 
 int direction_of(const Eigen::Vector2d& normal_px) {
@@ -42,7 +42,8 @@ void SharedErrors::add(const ContourOffset& contour, const BlockSample& sample,
                        JointMeasurement& measurement) {
   const auto [delay, offset] = on(contour);
   measurement.add_shared_error(delay.number, delay.px, sample);
-  measurement.add_shared_error(offset.number, by_clutter(contour.concentration) * offset.px, sample);
+  const double clear = contour.sigma_m > 0 ? kClearOfMap : kClear;
+  measurement.add_shared_error(offset.number, by_clutter(contour.concentration, clear) * offset.px, sample);
 }
 
 }  // namespace evpose

@@ -152,10 +152,15 @@ void PoseVerifier::decay(double elapsed_s) {
 void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours,
                        double span_s, double elapsed_s, const BlockThinning& thinning) {
   decay(elapsed_s);
+  const std::span<const FilteredEvent> quiet = bursts_.quiet(events);
+  if (quiet.empty() && !events.empty()) {
+    verdict_ = judge();
+    return;
+  }
   const auto pixel_of = [this](const FilteredEvent& e) -> std::uint8_t& {
     return pixels_[static_cast<std::size_t>(e.y) * static_cast<std::size_t>(size_.width) + e.x];
   };
-  for (const FilteredEvent& e : events)
+  for (const FilteredEvent& e : quiet)
     if (pixel_of(e) < kMostEvents) ++pixel_of(e);
   marked_.clear();
   for (const ContourSample& contour : contours) {
@@ -166,7 +171,7 @@ void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const Co
   for (const ContourSample& contour : contours)
     if (thinning.takes(contour.pixel)) look_at(contour, span_s);
   for (const std::uint32_t i : marked_) pixels_[i] = 0;
-  for (const FilteredEvent& e : events) pixel_of(e) = 0;
+  for (const FilteredEvent& e : quiet) pixel_of(e) = 0;
   verdict_ = judge();
 }
 

@@ -11,6 +11,7 @@
 #include "evpose/event/event_preprocessor.h"
 #include "evpose/registration/block_thinning.h"
 #include "evpose/registration/contour_view.h"
+#include "evpose/tracker/event_bursts.h"
 
 namespace evpose {
 
@@ -33,6 +34,7 @@ struct PoseEvidence {
 /// those on the same contours moved aside in the image, piece by piece. A wrong pose that has been fitted to
 /// the events has some contours on edges of the image; most are where there is none. A map that is right but
 /// for what runs in one direction holds the pose in the others only, so each direction is judged by itself.
+/// Of lamps that flicker the bursts of events are left out.
 class PoseVerifier {
  public:
   /// `pieces`: number of the map's contrast segments; `map_hides`: it has surfaces that hide contours.
@@ -85,6 +87,7 @@ class PoseVerifier {
   static constexpr std::uint8_t kOnContour = 0x80, kMostEvents = 0x7F;
 
   ImageSize size_;
+  EventBursts bursts_;
   double confirmed_ratio_;            ///< of events on contours to those beside
   double direction_ratio_;            ///< the same of each direction
   std::vector<std::uint8_t> pixels_;  ///< number of this update's events, kOnContour

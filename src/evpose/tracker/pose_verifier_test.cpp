@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 
 #include "evpose/tracker/test_flight.h"
 
@@ -27,7 +29,8 @@ class PoseVerifierLaws : public ::testing::Test {
   }
 
   /// What is said in the end of the events of world_ if `map` is believed, seen from a pose off the true one.
-  static PoseVerdict verdict(const ContourMap& map, const Vector6d& off, bool silent = false) {
+  static PoseVerdict verdict(const ContourMap& map, const Vector6d& off, bool silent = false,
+                             bool flickers = false) {
     const ContourSegments segments = cut_into_segments(map);
     const Pose T_body_cam = test_flight::camera_on_body();
     const ContourView view{map, segments, *camera_, T_body_cam, 1e-3};
@@ -40,8 +43,9 @@ class PoseVerifierLaws : public ::testing::Test {
       project_contours(view, points, {pose_at(t_s).plus(off), test_flight::velocity_at(t_s), rate}, kUpdate_s,
                        samples);
       std::erase_if(samples, [](const ContourSample& s) { return !camera_->size().contains(s.pixel); });
-      verifier.add(silent ? std::vector<FilteredEvent>{} : between(t_s - kUpdate_s, t_s), samples, kUpdate_s,
-                   kLook_s);
+      auto events = silent ? std::vector<FilteredEvent>{} : between(t_s - kUpdate_s, t_s);
+      if (flickers) events = with_flicker(std::move(events), t_s);
+      verifier.add(events, samples, kUpdate_s, kLook_s);
     }
     return verifier.verdict();
   }
@@ -55,9 +59,30 @@ class PoseVerifierLaws : public ::testing::Test {
       f.x = e.event.x;
       f.y = e.event.y;
       f.on = e.event.on;
+      f.stamp_us = static_cast<std::uint32_t>(1e6 * e.t_s);
       out.push_back(f);
     }
     return out;
+  }
+  /// Lamps brighten and darken 100 times a second: in two thirds of the time a tenth of the pixels have an
+  /// event each millisecond.
+  static std::vector<FilteredEvent> with_flicker(std::vector<FilteredEvent> events, double t_s) {
+    std::mt19937 random(static_cast<unsigned>(1e6 * t_s));
+    const ImageSize size = camera_->size();
+    for (double at_s = t_s - kUpdate_s; at_s < t_s; at_s += 1e-4) {
+      const double phase = 200 * at_s - std::floor(200 * at_s);
+      if (phase < 0.33) continue;
+      for (int i = 0; i < size.width * size.height / 100; ++i) {
+        FilteredEvent f{};
+        f.x = static_cast<std::uint16_t>(random() % static_cast<unsigned>(size.width));
+        f.y = random() % static_cast<unsigned>(size.height) & 0x7FFFU;
+        f.on = static_cast<unsigned>(200 * at_s) & 1U;
+        f.stamp_us = static_cast<std::uint32_t>(1e6 * at_s);
+        events.push_back(f);
+      }
+    }
+    std::ranges::stable_sort(events, {}, &FilteredEvent::stamp_us);
+    return events;
   }
 
  protected:
@@ -68,6 +93,13 @@ class PoseVerifierLaws : public ::testing::Test {
 
 TEST_F(PoseVerifierLaws, TheTruePoseIsConfirmed) {
   EXPECT_EQ(verdict(world_, Vector6d::Zero()), PoseVerdict::confirmed);
+}
+
+TEST_F(PoseVerifierLaws, LampsThatFlickerChangeNothing) {
+  EXPECT_EQ(verdict(world_, Vector6d::Zero(), false, true), PoseVerdict::confirmed);
+  Vector6d off = Vector6d::Zero();
+  off.head<3>() << 0.1, -0.15, 0.1;
+  EXPECT_EQ(verdict(world_, off, false, true), PoseVerdict::refuted);
 }
 
 TEST_F(PoseVerifierLaws, TheMapOfAnotherPlaceIsRefuted) {

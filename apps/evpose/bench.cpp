@@ -117,6 +117,7 @@ void add_relocalization(CLI::App& bench, Run& run) {
                    "tracked; default: all")
       ->delimiter(',');
   command->add_flag("!--no-imu", request->imu, "leave the IMU out");
+  command->add_option("--map", request->selection.map, "of all of them, in place of their true contours");
   command->callback(
       [=, &run] { run = [=] { return exit_status(experiments::print_relocalization(*request)); }; });
 }

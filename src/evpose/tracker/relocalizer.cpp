@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
+#include "evpose/tracker/tracker_parts.h"
 
 namespace evpose {
 namespace {
@@ -37,9 +39,14 @@ constexpr double kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
 constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
-constexpr double kLeastLead = 1.15;                    // over the next pose, in support
-constexpr double kLeastExplained = 0.06;               // of all events, beyond an even spread; wide searches
-constexpr double kClearLead = 2;                       // makes a low concentration enough
+constexpr double kLeastLead = 1.15;       // over the next pose, in support
+constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
+constexpr double kClearLead = 2;          // makes a low concentration enough
+// In a map that may be wrong a pose has to be found twice, in events of their own, by searches of their own.
+constexpr double kOtherEvents_s = 0.04, kLongestAgo_s = 0.5;
+constexpr int kSeedsApart = 100;
+constexpr std::size_t kMostEarlier = 4;
+constexpr double kSamePlace_m = 0.03, kSameVelocity_m_s = 0.3, kSamePlace_rad = 0.02;
 constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
 
 VisibleSetConfig points_to_search(VisibleSetConfig config) {
@@ -70,7 +77,10 @@ Relocalizer::Workspace::Workspace(const RelocalizerScene& scene, const Hypothesi
       refiner(scene, motion) {}
 
 Relocalizer::Relocalizer(const RelocalizerScene& scene)
-    : scene_(scene), motion_(scene.gravity_map), slice_(scene.camera.size().width) {}
+    : scene_(scene),
+      motion_(scene.gravity_map),
+      slice_(scene.camera.size().width),
+      map_may_be_wrong_(states_errors(scene.index.map())) {}
 
 void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance) {
   if (!workspace_) workspace_ = std::make_unique<Workspace>(scene_, motion_);
@@ -80,7 +90,8 @@ void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& 
   since_slice_ = {};
   elapsed_s_ = 0;
   restart_search(t);
-  searches_ = 0;
+  searches_ = found_ = 0;
+  earlier_.clear();
   workspace_->widely = motion_.has_imu() && WideSearch::suits(covariance, scene_.camera);
   if (!workspace_->widely) return;
   if (!workspace_->wide)
@@ -108,6 +119,7 @@ double Relocalizer::pause_s() const {
 }
 
 double Relocalizer::gap_s() const {
+  if (slices_ == 0 && !earlier_.empty()) return kOtherEvents_s;
   if (slices_ == 0) return pause_s();
   return slices_ >= kMostSlices ? kAmbiguousGap_s : kGap_s;
 }
@@ -115,6 +127,10 @@ double Relocalizer::gap_s() const {
 std::optional<Relocalizer::Found> Relocalizer::process(const RelocalizerInput& input) {
   since_slice_ = joined(since_slice_, input.motion);
   angular_rate_ = input.angular_rate;
+  for (Earlier& one : earlier_) {
+    motion_.propagate(one.pose, input.motion, true);
+    one.age_s += input.motion.dt_s;
+  }
   workspace_->refiner.add_events(input.events, input.now_us, input.motion, input.angular_rate);
   if (to_seconds(input.t - last_slice_) < gap_s()) {
     slice_.restart(input.t);
@@ -148,6 +164,7 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
     workspace_->field.build(workspace_->compensated);
   }
   propagate_prior();
+  if (slices_ == 0) hypotheses_.clear();
   if (slices_ == 0 && workspace_->widely)
     search_widely(input.T_body_cam, age_s);
   else if (slices_ == 0)
@@ -184,10 +201,9 @@ void Relocalizer::search_around_prior(const Pose& T_body_cam, double age_s) {
   Matrix6d covariance = widening * widening * prior_covariance_;
   covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(kUnknownVelocitySigma_m_s * elapsed_s_, 2);
   const SearchView view = view_from(prior_.T_map_body, T_body_cam);
-  hypotheses_.clear();
   if (view.points.empty()) return;
-  for (const PoseGuess& guess :
-       search_pose(view, prior_.T_map_body, covariance, static_cast<unsigned>(1 + searches_)))
+  for (const PoseGuess& guess : search_pose(view, prior_.T_map_body, covariance,
+                                            static_cast<unsigned>(1 + searches_ + kSeedsApart * found_)))
     add_hypothesis(guess, prior_.velocity, T_body_cam, age_s);
 }
 
@@ -201,7 +217,6 @@ WidePrior Relocalizer::wide_prior() const {
 }
 
 void Relocalizer::search_widely(const Pose& T_body_cam, double age_s) {
-  hypotheses_.clear();
   for (const PoseGuess& guess :
        workspace_->wide->find(workspace_->compensated, workspace_->field, T_body_cam, wide_prior()))
     add_hypothesis(guess, Eigen::Vector3d::Zero(), T_body_cam, age_s);
@@ -296,6 +311,25 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
   return concentrated || alone;
 }
 
+/// Of a map that has few of the contours, and some where none are, several poses may find support for a
+/// moment: one is believed that searches in other events have found as well. Else the next search begins.
+bool Relocalizer::is_found_again(const PoseHypothesis& best) {
+  const bool again = std::ranges::any_of(earlier_, [&](const Earlier& one) {
+    const Vector6d d = best.nav.T_map_body.minus(one.pose.nav.T_map_body);
+    return one.age_s < kLongestAgo_s && d.head<3>().norm() < kSamePlace_m + kSameVelocity_m_s * one.age_s &&
+           d.tail<3>().norm() < kSamePlace_rad;
+  });
+  if (again) return true;
+  const Eigen::Vector3d& p = best.nav.T_map_body.p;
+  log_detail(text("pose found once at ", p.x(), ", ", p.y(), ", ", p.z(), " m: ", best.support,
+                  " events, concentration ", best.mean_concentration, "; searching again"));
+  if (earlier_.size() == kMostEarlier) earlier_.erase(earlier_.begin());
+  earlier_.push_back({best});
+  ++found_;
+  slices_ = 0;
+  return false;
+}
+
 std::vector<Pose> Relocalizer::candidates() const {
   std::vector<Pose> out;
   if (slices_ < kLeastSlices) return out;
@@ -316,10 +350,12 @@ std::optional<Relocalizer::Found> Relocalizer::accept_best() {
   if (!hypotheses_.empty()) {
     const PoseHypothesis& best = hypotheses_.front();
     if (is_accepted(best)) {
+      if (map_may_be_wrong_ && !is_found_again(best)) return {};
       const Eigen::Vector3d& p = best.nav.T_map_body.p;
       log_detail(text("pose found at ", p.x(), ", ", p.y(), ", ", p.z(), " m: ", best.support, " events, ",
                       100 * best.explained, " % of all, concentration ", best.mean_concentration));
       searching_ = false;
+      earlier_.clear();
       return Found{best.nav, motion_.angular_rate(best, angular_rate_)};
     }
     if (!candidates().empty()) return {};

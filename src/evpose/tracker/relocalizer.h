@@ -92,6 +92,11 @@ class Relocalizer {
     std::vector<FilteredEvent> compensated;  ///< the slice's events, without rotation
     std::vector<SearchPoint> points;
   };
+  /// A pose that was found and is to be found again, carried on by the IMU.
+  struct Earlier {
+    PoseHypothesis pose;
+    double age_s = 0;
+  };
   double pause_s() const;
   double gap_s() const;
   bool explains_enough(const PoseHypothesis& h) const;
@@ -109,6 +114,7 @@ class Relocalizer {
   PoseHypothesis corrected_by_edges(const PoseHypothesis& predicted, const SearchView& view,
                                     double age_s) const;
   bool is_accepted(const PoseHypothesis& best) const;
+  bool is_found_again(const PoseHypothesis& best);
   std::optional<Found> accept_best();
 
   RelocalizerScene scene_;
@@ -125,6 +131,9 @@ class Relocalizer {
   double elapsed_s_ = 0;      ///< from begin_search() to the last slice
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   int slices_ = 0, searches_ = 0;
+  int found_ = 0;                 ///< so often since begin_search()
+  std::vector<Earlier> earlier_;  ///< the newest last
+  bool map_may_be_wrong_;         ///< it states errors of its contours
 };
 
 }  // namespace evpose

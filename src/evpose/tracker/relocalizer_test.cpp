@@ -219,6 +219,18 @@ TEST_F(RelocalizerLaws, FindsThePoseFromPoorStartsWithinItsSigmas) {
   }
 }
 
+// In events of their own, so the second search takes as long again, and as long as it waits for them.
+TEST_F(RelocalizerLaws, InAMapThatMayBeWrongAPoseHasToBeFoundTwice) {
+  ContourMap map = *world_;
+  for (ContourPoint& p : map.points) p.sigma = 1e-3F;
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    const Outcome once = search(seed, *world_, 0.25), twice = search(seed, map, 0.6);
+    ASSERT_TRUE(once.found && twice.found) << seed;
+    EXPECT_GT(twice.t_s, once.t_s + 0.04) << seed;
+    EXPECT_TRUE(twice.within_sigmas()) << seed << ": off by " << twice.position_error_m() << " m";
+  }
+}
+
 TEST_F(RelocalizerLaws, FindsThePoseFromMetresOffWithAnyHeading) {
   PoorStart start(2);
   ContourMap map = *world_;  // with something behind the flight: it is searched among the contours

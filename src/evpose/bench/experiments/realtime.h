@@ -9,7 +9,7 @@ namespace evpose::experiments {
 
 struct RealtimeRequest {
   Selection selection{
-      .folder = "../shared/data/peer", .only = {"room_spiral", "room_720p"}, .assignments = {}};
+      .folder = "../shared/data/peer", .only = {"room_spiral", "room_720p"}, .assignments = {}, .map = {}};
   std::vector<double> rates_mev_s = {1, 5, 20, 50};  ///< of all events; below the recording's own: as it is
   std::vector<double> updates_hz = {300, 1000};
 };

@@ -41,6 +41,8 @@ Expected<std::vector<BenchRecording>> select_recordings(const Selection& selecti
     return !only.empty() && std::find(only.begin(), only.end(), r.name) == only.end();
   };
   found.erase(std::remove_if(found.begin(), found.end(), unwanted), found.end());
+  for (BenchRecording& r : found)
+    if (!selection.map.empty()) r.map = selection.map, r.occluders.clear();
   if (found.empty())
     return Error{selection.folder, "none of the wanted recordings is there",
                  "give the folder of the shared recordings or one that evpose simulate has filled"};

@@ -13,6 +13,7 @@ struct Selection {
   std::string folder = "../shared/data/peer";
   std::vector<std::string> only;         ///< names of recordings; empty: all
   std::vector<std::string> assignments;  ///< settings of the tracker, "key=value"
+  std::string map;                       ///< for all of them; empty: their true contours and surfaces
 };
 
 /// A recording with ground truth, a map and a mesh that hides contours.

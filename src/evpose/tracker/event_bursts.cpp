@@ -2,7 +2,6 @@
 #include "evpose/tracker/event_bursts.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace evpose {
 namespace {
@@ -14,13 +13,29 @@ constexpr std::size_t kFew = 20;        // events of a slice that may come by ch
 
 }  // namespace
 
-std::vector<std::size_t> slice_ends(std::span<const FilteredEvent> events) {
-  std::vector<std::size_t> ends;
+namespace {
+
+/// Calls take(slice) for each.
+template <class Take>
+void for_slices(std::span<const FilteredEvent> events, const Take& take) {
   const auto slice = [&](std::size_t i) {
     return (events[i].stamp_us - events.front().stamp_us) / kEventSlice_us;
   };
+  std::size_t begin = 0;
   for (std::size_t i = 0; i < events.size(); ++i)
-    if (i + 1 == events.size() || slice(i + 1) != slice(i)) ends.push_back(i + 1);
+    if (i + 1 == events.size() || slice(i + 1) != slice(i)) {
+      take(events.subspan(begin, i + 1 - begin));
+      begin = i + 1;
+    }
+}
+
+}  // namespace
+
+std::vector<std::size_t> slice_ends(std::span<const FilteredEvent> events) {
+  std::vector<std::size_t> ends;
+  for_slices(events, [&](std::span<const FilteredEvent> slice) {
+    ends.push_back(slice.size() + (ends.empty() ? 0 : ends.back()));
+  });
   return ends;
 }
 
@@ -41,19 +56,20 @@ std::size_t EventBursts::quiet_count() const {
 }
 
 std::span<const FilteredEvent> EventBursts::quiet(std::span<const FilteredEvent> events) {
-  const std::vector<std::size_t> ends = slice_ends(events);
-  std::size_t begin = 0;
-  for (const std::size_t end : ends) counts_[seen_++ % kSlices] = end - std::exchange(begin, end);
-  if (ends.empty()) return events;
+  if (events.empty()) return events;
+  for_slices(events,
+             [&](std::span<const FilteredEvent> slice) { counts_[seen_++ % kSlices] = slice.size(); });
   const std::size_t most = kTimesQuiet * std::max(quiet_count(), kFew);
+  const auto is_burst = [&](std::span<const FilteredEvent> slice) {
+    return slice.size() > most && changes_as_a_whole(slice);
+  };
+  bool bursts = false;
+  for_slices(events, [&](std::span<const FilteredEvent> slice) { bursts = bursts || is_burst(slice); });
+  if (!bursts) return events;
   quiet_.clear();
-  begin = 0;
-  for (const std::size_t end : ends) {
-    const auto slice = events.subspan(begin, end - begin);
-    if (slice.size() <= most || !changes_as_a_whole(slice))
-      quiet_.insert(quiet_.end(), slice.begin(), slice.end());
-    begin = end;
-  }
+  for_slices(events, [&](std::span<const FilteredEvent> slice) {
+    if (!is_burst(slice)) quiet_.insert(quiet_.end(), slice.begin(), slice.end());
+  });
   return quiet_;
 }
 

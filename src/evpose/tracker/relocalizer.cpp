@@ -42,7 +42,7 @@ constexpr double kLeastConcentration = 0.42;
 constexpr double kLeastLead = 1.15;       // over the next pose, in support
 constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
 constexpr double kClearLead = 2;          // makes a low concentration enough
-// In a map that may be wrong a pose has to be found twice, in events of their own, by searches of their own.
+// Found twice: in events of their own, by searches of their own.
 constexpr double kOtherEvents_s = 0.04, kLongestAgo_s = 0.5;
 constexpr int kSeedsApart = 100;
 constexpr std::size_t kMostEarlier = 4;
@@ -82,10 +82,11 @@ Relocalizer::Relocalizer(const RelocalizerScene& scene)
       slice_(scene.camera.size().width),
       map_may_be_wrong_(states_errors(scene.index.map())) {}
 
-void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance) {
+void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance, bool was_known) {
   if (!workspace_) workspace_ = std::make_unique<Workspace>(scene_, motion_);
   prior_ = state;
   prior_covariance_ = covariance;
+  twice_ = was_known && map_may_be_wrong_;
   last_slice_ = 0;
   since_slice_ = {};
   elapsed_s_ = 0;
@@ -350,7 +351,7 @@ std::optional<Relocalizer::Found> Relocalizer::accept_best() {
   if (!hypotheses_.empty()) {
     const PoseHypothesis& best = hypotheses_.front();
     if (is_accepted(best)) {
-      if (map_may_be_wrong_ && !is_found_again(best)) return {};
+      if (twice_ && !is_found_again(best)) return {};
       const Eigen::Vector3d& p = best.nav.T_map_body.p;
       log_detail(text("pose found at ", p.x(), ", ", p.y(), ", ", p.z(), " m: ", best.support, " events, ",
                       100 * best.explained, " % of all, concentration ", best.mean_concentration));

@@ -55,8 +55,9 @@ class Relocalizer {
 
   explicit Relocalizer(const RelocalizerScene& scene);
 
-  /// Begins a search around `state`; covariance of its pose as Pose::plus.
-  void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance);
+  /// Begins a search around `state`; covariance of its pose as Pose::plus. `was_known`: the pose was tracked
+  /// until now, and in a map that states errors it is left only for one that is found twice.
+  void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance, bool was_known);
   bool searching() const { return searching_; }
   /// The pose is not where it was searched, at any width of the search.
   bool has_tried_all() const;
@@ -134,6 +135,7 @@ class Relocalizer {
   int found_ = 0;                 ///< so often since begin_search()
   std::vector<Earlier> earlier_;  ///< the newest last
   bool map_may_be_wrong_;         ///< it states errors of its contours
+  bool twice_ = false;            ///< the pose has to be found so
 };
 
 }  // namespace evpose

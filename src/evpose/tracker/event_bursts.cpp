@@ -11,10 +11,6 @@ constexpr std::size_t kTimesQuiet = 3;  // a burst has more events,
 constexpr double kOneWay = 0.85;        // and of these so many are of one polarity
 constexpr std::size_t kFew = 20;        // events of a slice that may come by chance
 
-}  // namespace
-
-namespace {
-
 /// Calls take(slice) for each.
 template <class Take>
 void for_slices(std::span<const FilteredEvent> events, const Take& take) {

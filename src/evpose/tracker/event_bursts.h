@@ -27,7 +27,7 @@ class EventBursts {
   std::span<const FilteredEvent> quiet(std::span<const FilteredEvent> events);
 
  private:
-  static constexpr std::size_t kSlices = 32;  ///< that are remembered: some tenths of a second of looks
+  static constexpr std::size_t kSlices = 32;  ///< that are remembered: of 0.06 to 0.2 s, as looks are apart
   std::size_t quiet_count() const;
 
   std::array<std::size_t, kSlices> counts_{};

@@ -60,7 +60,8 @@ void EventIntervals::add(std::span<const FilteredEvent> events, std::uint32_t no
   }
   EventInterval& newest = intervals_.back();
   const double most = std::max(1.0, kMostEvents_s * motion.dt_s);
-  const std::vector<std::size_t> ends = slice_ends(events);
+  std::vector<std::size_t> ends;
+  if (static_cast<double>(events.size()) > most) ends = slice_ends(events);
   if (has_burst(events, ends)) {
     const FairShare share(ends, most);
     std::size_t begin = 0;

@@ -26,7 +26,8 @@ class EventIntervals {
  public:
   static constexpr double kInterval_s = 0.008;
   /// Errors that an edge's events share count for more than the noise of so many: the rest is left out,
-  /// evenly in time: lamps that flicker make many events in bursts, what moves makes some all the time.
+  /// evenly, and where lamps flicker evenly in time: these make events in bursts, what moves makes some
+  /// always.
   static constexpr double kMostEvents_s = 1.25e6;
 
   /// Keeps the newest `most` intervals.

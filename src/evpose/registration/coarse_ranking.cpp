@@ -2,12 +2,13 @@
 #include "evpose/registration/coarse_ranking.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace evpose {
 namespace {
 
-constexpr double kCell_px = 4;       // of the table; the coarse spread is 6 px
+constexpr double kCell_px = 2;       // of the table, and the step of turns; the fine spread is 1.5 px
 constexpr double kWidestTan = 2.5;   // of an image that is wider, the rim is left out
 constexpr float kNearest_m = 0.05F;  // points nearer to the camera are not projected
 constexpr double kMargin_px = 2;
@@ -34,13 +35,13 @@ Eigen::Vector2d half_view(const Camera& camera) {
 
 CoarseScores::CoarseScores(const EdgeField& field, const Camera& camera, float seen_share,
                            float outside_score)
-    : cells_per_unit_(static_cast<float>(camera.focal_px() / kCell_px)) {
+    : cells_per_unit_(static_cast<float>(camera.focal_px() / kCell_px)), outside_score_(outside_score) {
   const Eigen::Vector2d half = half_view(camera) * camera.focal_px() / kCell_px;
-  columns_ = 2 * static_cast<int>(std::ceil(half.x())) + 1;
-  rows_ = 2 * static_cast<int>(std::ceil(half.y())) + 1;
+  columns_ = 2 * static_cast<int>(std::ceil(half.x())) + 1 + kTurns;
+  rows_ = 2 * static_cast<int>(std::ceil(half.y())) + 1 + kTurns;
   half_width_ = 0.5F * static_cast<float>(columns_);
   half_height_ = 0.5F * static_cast<float>(rows_);
-  scores_.assign(entry(0, 0, kDirections) + 1, outside_score);
+  scores_.assign(entry(0, 0, kDirections), outside_score);
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column) fill_cell(field, camera, column, row, seen_share);
 }
@@ -57,7 +58,7 @@ void CoarseScores::fill_cell(const EdgeField& field, const Camera& camera, int c
     const int direction = EdgeField::direction(along.x(), along.y());
     scores_[entry(column, row, k)] =
         std::log(1 - seen_share +
-                 seen_share * field.likelihood_ratio(pixel->x(), pixel->y(), direction, EdgeSpread::coarse));
+                 seen_share * field.likelihood_ratio(pixel->x(), pixel->y(), direction, EdgeSpread::fine));
   }
 }
 
@@ -76,11 +77,12 @@ void CoarseScores::set_points(std::span<const SearchPoint> points, std::size_t s
   }
 }
 
-double CoarseScores::score(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const {
+void CoarseScores::find_entries(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const {
   const float *px = points_.data(), *py = px + count_, *pz = py + count_, *tx = pz + count_,
               *ty = tx + count_, *tz = ty + count_;
-  const auto columns = static_cast<float>(columns_), rows = static_cast<float>(rows_);
-  const int plane = columns_ * rows_, outside = plane * kDirections, width = columns_;
+  const int plane = columns_ * rows_, width = columns_;
+  constexpr float kRim = kTurns / 2;
+  const float last_column = static_cast<float>(columns_) - kRim, last_row = static_cast<float>(rows_) - kRim;
   std::int32_t* entries = entries_.data();
   for (std::size_t i = 0; i < count_; ++i) {
     const float x = R(0, 0) * px[i] + R(0, 1) * py[i] + R(0, 2) * pz[i] + t.x();
@@ -93,15 +95,34 @@ double CoarseScores::score(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) c
     const float a = std::abs(du), b = std::abs(dv);
     const float turn = (du * dv >= 0 ? b : 2 * a + b) / std::max(a + b, 1e-12F);  // 0 .. 2, as direction_of()
     const int direction = static_cast<int>(0.5F * (kDirections * turn + 1)) & (kDirections - 1);
-    const float column = std::min(std::max(u * cells_per_unit_ + half_width_, -1.0F), columns + 1),
-                row = std::min(std::max(v * cells_per_unit_ + half_height_, -1.0F), rows + 1);
-    const bool inside = z > kNearest_m && column >= 0 && row >= 0 && column < columns && row < rows;
+    const float column = std::min(std::max(u * cells_per_unit_ + half_width_, 0.0F), last_column),
+                row = std::min(std::max(v * cells_per_unit_ + half_height_, 0.0F), last_row);
+    const bool inside =
+        z > kNearest_m && column >= kRim && row >= kRim && column < last_column && row < last_row;
     const int at = direction * plane + static_cast<int>(row) * width + static_cast<int>(column);
-    entries[i] = inside ? at : outside;
+    entries[i] = inside ? at : -1;
   }
-  float sum = 0;
-  for (std::size_t i = 0; i < count_; ++i) sum += scores_[static_cast<std::size_t>(entries[i])];
-  return count_ > 0 ? static_cast<double>(sum) / static_cast<double>(count_) : 0;
+}
+
+CoarseScores::Turned CoarseScores::best_turn(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const {
+  find_entries(R, t);
+  std::array<float, static_cast<std::size_t>(kTurns * kTurns)> sums{};
+  float outside = 0;
+  for (const std::int32_t at : entries_) {
+    if (at < 0) {
+      outside += outside_score_;
+      continue;
+    }
+    const float* from = scores_.data() + at - kTurns / 2 * (columns_ + 1);
+    float* sum = sums.data();
+    for (int row = 0; row < kTurns; ++row, from += columns_, sum += kTurns)
+      for (int column = 0; column < kTurns; ++column) sum[column] += from[column];
+  }
+  const auto best = static_cast<int>(std::ranges::max_element(sums) - sums.begin());
+  const double x = (best % kTurns - kTurns / 2) / static_cast<double>(cells_per_unit_),
+               y = (best / kTurns - kTurns / 2) / static_cast<double>(cells_per_unit_);
+  const double total = static_cast<double>(sums[static_cast<std::size_t>(best)] + outside);
+  return {{y, -x, 0}, count_ > 0 ? total / static_cast<double>(count_) : 0};
 }
 
 }  // namespace evpose

@@ -13,8 +13,8 @@
 namespace evpose {
 namespace {
 
-constexpr int kGuesses = 20000;
-constexpr std::size_t kRefined = 48;          // of the guesses
+constexpr int kGuesses = 6000;                // with 64 turns of each
+constexpr std::size_t kRefined = 64;          // of the guesses
 constexpr std::size_t kKept = 16;             // of the refined ones, for later slices to choose from
 constexpr double kSeenShare = 0.3;            // of the contours in view, motion makes so many visible
 constexpr std::size_t kComparedPoints = 200;  // enough to rank guesses
@@ -26,6 +26,7 @@ constexpr double kLastReach_px = 3;           // of the refinement with all poin
 constexpr double kNarrowing = 0.6;            // of the kernel, from width to width
 constexpr double kNarrowest_px = 1;           // the sharpness of the edges
 constexpr double kConverged = 0.05;    // a step below this share of the kernel's width ends the iterations
+constexpr double kApart_px = 8;       // of those to refine: that far the turns and the refinement reach
 constexpr double kDifferent_px = 3;    // poses that move the points by less are one
 constexpr double kTypicalDepth_m = 3;  // turns metres into pixels where poses are compared
 constexpr double kNearest_m = 0.05;    // points nearer to the camera are not projected
@@ -136,8 +137,11 @@ std::vector<PoseGuess> draw_guesses(const SearchView& view, const Pose& prior, c
   std::vector<PoseGuess> guesses(kGuesses);
   for (PoseGuess& g : guesses) {
     g.T_map_body = &g == guesses.data() ? prior : prior.plus(root * standard_normal(random));
-    const Pose T_cam_map = T_cam_body * g.T_map_body.inverse();
-    g.score = scores.score(T_cam_map.rotation().cast<float>(), (T_cam_map * prior.p).cast<float>());
+    const Pose T_map_cam = g.T_map_body * view.T_body_cam, T_cam_map = T_map_cam.inverse();
+    const auto best =
+        scores.best_turn(T_cam_map.rotation().cast<float>(), (T_cam_map * prior.p).cast<float>());
+    g.score = best.score;
+    g.T_map_body = Pose{(T_map_cam.q * so3::exp(best.turn)).normalized(), T_map_cam.p} * T_cam_body;
   }
   return guesses;
 }
@@ -187,10 +191,12 @@ std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, co
   const double focal_px = view.camera.focal_px();
   std::vector<PoseGuess> guesses = draw_guesses(view, prior, covariance, seed);
   const PoseGuess first = guesses.front();
-  const auto same = [&](const PoseGuess& a, const PoseGuess& b) {
-    return image_motion_px(a.T_map_body, b.T_map_body, focal_px) < kDifferent_px;
+  const auto nearer_than = [focal_px](double px) {
+    return [=](const PoseGuess& a, const PoseGuess& b) {
+      return image_motion_px(a.T_map_body, b.T_map_body, focal_px) < px;
+    };
   };
-  keep_different(guesses, kRefined, same);
+  keep_different(guesses, kRefined, nearer_than(kApart_px));
   guesses.push_back(first);
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
   const double evidence = static_cast<double>(view.points.size()) / kCorrelatedPoints;
@@ -202,7 +208,7 @@ std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, co
       const Vector6d off = g.T_map_body.minus(prior);
       g.score -= 0.5 * off.dot(information * off) / evidence;
     }
-    keep_different(guesses, kKept, same);
+    keep_different(guesses, kKept, nearer_than(kDifferent_px));
   };
   refine(coarse, refine_reach_px());
   refine(view, kLastReach_px);

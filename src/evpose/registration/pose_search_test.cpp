@@ -115,18 +115,31 @@ TEST_F(PoseSearchLaws, TheTruePoseScoresBest) {
   }
 }
 
-TEST_F(PoseSearchLaws, TheTableOfScoresSaysWhatTheFieldDoes) {
+TEST_F(PoseSearchLaws, TheTableOfScoresSaysWhatTheFieldDoesOfTheBestTurn) {
   CoarseScores table(field_, *camera_, 0.3F, -0.3F);
   table.set_points(points_, 1, Eigen::Vector3d::Zero());
   for (int axis = 0; axis < 6; ++axis)
-    for (const double off : {0.0, 0.03, -0.06, 0.2}) {
+    for (const double off : {0.0, 0.01, -0.02, 0.2}) {
       Vector6d d = Vector6d::Zero();
       d(axis) = off;
-      const Pose T_cam_map = Pose{}.plus(d).inverse();
-      EXPECT_NEAR(table.score(T_cam_map.rotation().cast<float>(), T_cam_map.p.cast<float>()),
-                  score_pose(view(), Pose{}.plus(d), EdgeSpread::coarse), 0.1)
-          << axis << ' ' << off;
+      const Pose T_map_cam = Pose{}.plus(d), T_cam_map = T_map_cam.inverse();
+      const auto best = table.best_turn(T_cam_map.rotation().cast<float>(), T_cam_map.p.cast<float>());
+      const Pose turned{T_map_cam.q * so3::exp(best.turn), T_map_cam.p};
+      EXPECT_NEAR(best.score, score_pose(view(), turned, EdgeSpread::fine), 0.1) << axis << ' ' << off;
     }
+}
+
+TEST_F(PoseSearchLaws, ATurnWithinReachIsTurnedBack) {
+  CoarseScores table(field_, *camera_, 0.3F, -0.3F);
+  table.set_points(points_, 1, Eigen::Vector3d::Zero());
+  const double px = 1 / camera_->focal_px();
+  for (const Eigen::Vector2d& off_px :
+       {Eigen::Vector2d(5, 0), Eigen::Vector2d(-3, 6), Eigen::Vector2d(4, -5)}) {
+    const Eigen::Vector3d off(off_px.x() * px, off_px.y() * px, 0);
+    const Pose T_cam_map = Pose{so3::exp(off), Eigen::Vector3d::Zero()}.inverse();
+    const auto best = table.best_turn(T_cam_map.rotation().cast<float>(), T_cam_map.p.cast<float>());
+    EXPECT_LT((best.turn + off).norm(), 1.5 * px) << off_px.transpose();
+  }
 }
 
 TEST_F(PoseSearchLaws, RefiningReturnsToTheTruePose) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace evpose {
 namespace {
@@ -57,13 +58,19 @@ void correct_by_edges(PoseHypothesis& h, const Vector6d& innovation) {
 
 void merge_duplicates(std::vector<PoseHypothesis>& hypotheses) {
   std::vector<PoseHypothesis> different;
-  for (const PoseHypothesis& h : hypotheses)
-    if (std::none_of(different.begin(), different.end(), [&](const PoseHypothesis& other) {
-          const Vector6d d = h.nav.T_map_body.minus(other.nav.T_map_body);
-          return d.head<3>().norm() < kDuplicate_m && d.tail<3>().norm() < kDuplicate_rad &&
-                 (h.nav.velocity - other.nav.velocity).norm() < kDuplicate_m_s;
-        }))
+  for (const PoseHypothesis& h : hypotheses) {
+    const auto same = std::ranges::find_if(different, [&](const PoseHypothesis& other) {
+      const Vector6d d = h.nav.T_map_body.minus(other.nav.T_map_body);
+      return d.head<3>().norm() < kDuplicate_m && d.tail<3>().norm() < kDuplicate_rad &&
+             (h.nav.velocity - other.nav.velocity).norm() < kDuplicate_m_s;
+    });
+    if (same == different.end()) {
       different.push_back(h);
+    } else if (same->newest_search != h.newest_search) {
+      same->found += h.found;
+      same->newest_search = std::max(same->newest_search, h.newest_search);
+    }
+  }
   hypotheses = std::move(different);
 }
 

@@ -26,6 +26,8 @@ struct PoseHypothesis {
   double support = 0;        ///< events that concentrate at the contours, in the last slice
   double explained = 0;      ///< share that these are of all events
   double mean_concentration = 0, mean_support = 0;  ///< over slices, the newest counting most
+  int found = 1;                                    ///< by so many searches
+  int newest_search = 0;                            ///< number of the last of these
 };
 
 /// How hypotheses move from slice to slice: by the IMU, or at constant velocity where there is none.
@@ -54,7 +56,8 @@ class HypothesisMotion {
 /// pose, as Pose::minus.
 void correct_by_edges(PoseHypothesis& h, const Vector6d& innovation);
 
-/// Hypotheses that have come together go on as one: the first of them stays. Best first.
+/// Hypotheses that have come together go on as one: the first of them stays, and was found by the searches of
+/// both. Best first.
 void merge_duplicates(std::vector<PoseHypothesis>& hypotheses);
 
 }  // namespace evpose

@@ -42,8 +42,7 @@ void PoseSupervisor::start(const FusionState& first, double sigma_px) {
   health_.start(first.t);
   before_search_ = first;
   start_is_unsure_ = sigma_px > Relocalizer::kSearchAboveSigma_px;
-  if (config_.on && start_is_unsure_)
-    relocalizer_.begin_search(first.t, first.nav, first.pose_covariance(), false);
+  if (config_.on && start_is_unsure_) relocalizer_.begin_search(first.t, first.nav, first.pose_covariance());
 }
 
 std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input, const BackEnd& fusion) {
@@ -150,7 +149,7 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
   around.diagonal().head<3>().array() += std::pow(config_.position_sigma_m, 2);
   around.diagonal().tail<3>().array() += std::pow(config_.rotation_sigma_rad, 2);
   before_search_ = fusion.state();
-  relocalizer_.begin_search(t, fusion.state().nav, around, true);
+  relocalizer_.begin_search(t, fusion.state().nav, around);
   verifier_.restart();
   astray_s_ = 0;
 }

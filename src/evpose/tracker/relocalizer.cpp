@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "evpose/core/config.h"
@@ -39,15 +40,16 @@ constexpr double kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
 constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
-constexpr double kLeastLead = 1.15;       // over the next pose, in support
-constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
-constexpr double kClearLead = 2;          // makes a low concentration enough
-// Found twice: in events of their own, by searches of their own.
-constexpr double kOtherEvents_s = 0.04, kLongestAgo_s = 0.5;
-constexpr int kSeedsApart = 100;
-constexpr std::size_t kMostEarlier = 4;
-constexpr double kSamePlace_m = 0.03, kSameVelocity_m_s = 0.3, kSamePlace_rad = 0.02;
+constexpr double kLeastLead = 1.15;                    // over the next pose, in support
+constexpr double kLeastExplained = 0.06;               // of all events, beyond an even spread; wide searches
+constexpr double kClearLead = 2;                       // makes a low concentration enough
 constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
+
+// Searches that compete, each in events of its own: a pose is believed that several of them have found.
+constexpr int kLastCompeting = 5;  // slices, from the third on
+constexpr std::size_t kNewcomers = 6, kMostTogether = 10;
+constexpr int kFoundBy = 2;
+constexpr double kFoundVelocitySpread_m_s = 0.3;  // wrong poses tell the velocity, too
 
 VisibleSetConfig points_to_search(VisibleSetConfig config) {
   config.stride_px = kPointStride_px;
@@ -82,17 +84,16 @@ Relocalizer::Relocalizer(const RelocalizerScene& scene)
       slice_(scene.camera.size().width),
       map_may_be_wrong_(states_errors(scene.index.map())) {}
 
-void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance, bool was_known) {
+void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance) {
   if (!workspace_) workspace_ = std::make_unique<Workspace>(scene_, motion_);
   prior_ = state;
   prior_covariance_ = covariance;
-  twice_ = was_known && map_may_be_wrong_;
   last_slice_ = 0;
   since_slice_ = {};
   elapsed_s_ = 0;
+  velocity_sigma_m_s_ = kUnknownVelocitySigma_m_s;
   restart_search(t);
-  searches_ = found_ = 0;
-  earlier_.clear();
+  searches_ = draws_ = 0;
   workspace_->widely = motion_.has_imu() && WideSearch::suits(covariance, scene_.camera);
   if (!workspace_->widely) return;
   if (!workspace_->wide)
@@ -120,7 +121,6 @@ double Relocalizer::pause_s() const {
 }
 
 double Relocalizer::gap_s() const {
-  if (slices_ == 0 && !earlier_.empty()) return kOtherEvents_s;
   if (slices_ == 0) return pause_s();
   return slices_ >= kMostSlices ? kAmbiguousGap_s : kGap_s;
 }
@@ -128,10 +128,6 @@ double Relocalizer::gap_s() const {
 std::optional<Relocalizer::Found> Relocalizer::process(const RelocalizerInput& input) {
   since_slice_ = joined(since_slice_, input.motion);
   angular_rate_ = input.angular_rate;
-  for (Earlier& one : earlier_) {
-    motion_.propagate(one.pose, input.motion, true);
-    one.age_s += input.motion.dt_s;
-  }
   workspace_->refiner.add_events(input.events, input.now_us, input.motion, input.angular_rate);
   if (to_seconds(input.t - last_slice_) < gap_s()) {
     slice_.restart(input.t);
@@ -159,7 +155,7 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
   const Eigen::Vector3d rate_cam = motion_.has_imu()
                                        ? Eigen::Vector3d(input.T_body_cam.q.conjugate() * angular_rate_)
                                        : Eigen::Vector3d::Zero();
-  if (slices_ < kSlicesWithEdges) {
+  if (slices_ < kSlicesWithEdges || searches_compete()) {
     compensate_rotation(slice_.events(), scene_.camera, {rate_cam, input.now_us, age_s},
                         workspace_->compensated);
     workspace_->field.build(workspace_->compensated);
@@ -172,6 +168,7 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
     search_around_prior(input.T_body_cam, age_s);
   else
     update_hypotheses(input.T_body_cam, age_s);
+  if (searches_compete()) search_again(input.T_body_cam, age_s);
   since_slice_ = {};
   ++slices_;
 }
@@ -200,12 +197,39 @@ void Relocalizer::search_around_prior(const Pose& T_body_cam, double age_s) {
   const double widening =
       std::pow(kWidening, std::clamp(searches_ - kSearchesOfFirstWidth, 0, kMostWidenings));
   Matrix6d covariance = widening * widening * prior_covariance_;
-  covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(kUnknownVelocitySigma_m_s * elapsed_s_, 2);
+  covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(velocity_sigma_m_s_ * elapsed_s_, 2);
   const SearchView view = view_from(prior_.T_map_body, T_body_cam);
   if (view.points.empty()) return;
-  for (const PoseGuess& guess : search_pose(view, prior_.T_map_body, covariance,
-                                            static_cast<unsigned>(1 + searches_ + kSeedsApart * found_)))
+  for (const PoseGuess& guess :
+       search_pose(view, prior_.T_map_body, covariance, static_cast<unsigned>(++draws_)))
     add_hypothesis(guess, prior_.velocity, T_body_cam, age_s);
+}
+
+bool Relocalizer::searches_compete() const {
+  return map_may_be_wrong_ && !workspace_->widely && slices_ >= kSlicesWithEdges && slices_ < kLastCompeting;
+}
+
+/// A map that has few of the contours, and some where none are, lets wrong poses find support, and one search
+/// may miss the right one: what searches in other events find is added to the hypotheses.
+void Relocalizer::search_again(const Pose& T_body_cam, double age_s) {
+  go_on_with_velocity_found();
+  std::vector<PoseHypothesis> all = std::exchange(hypotheses_, {});
+  search_around_prior(T_body_cam, age_s);
+  if (hypotheses_.size() > kNewcomers) hypotheses_.resize(kNewcomers);
+  for (PoseHypothesis& h : hypotheses_) h.newest_search = draws_;
+  all.insert(all.end(), hypotheses_.begin(), hypotheses_.end());
+  hypotheses_ = std::move(all);
+  rank_hypotheses();
+  keep_hopeful();
+}
+
+/// The prior has gone on with the velocity of the start, which may be wrong by metres per second.
+void Relocalizer::go_on_with_velocity_found() {
+  if (hypotheses_.empty() || hypotheses_.front().mean_concentration < kLowConcentration) return;
+  const Eigen::Vector3d off = hypotheses_.front().nav.velocity - prior_.velocity;
+  prior_.T_map_body.p += elapsed_s_ * off;
+  prior_.velocity += off;
+  velocity_sigma_m_s_ = kFoundVelocitySpread_m_s;
 }
 
 WidePrior Relocalizer::wide_prior() const {
@@ -229,7 +253,8 @@ void Relocalizer::add_hypothesis(const PoseGuess& guess, const Eigen::Vector3d& 
   PoseHypothesis h{
       {{guess.T_map_body.q * so3::exp(age_s * angular_rate_), guess.T_map_body.p + age_s * velocity},
        velocity}};
-  if (hypotheses_.size() < kRefined) workspace_->refiner.refine(h, T_body_cam, slices_);
+  if (hypotheses_.size() < kRefined)
+    workspace_->refiner.refine(h, T_body_cam, std::min(slices_, kSlicesWithEdges));
   h.mean_concentration = h.concentration;
   h.mean_support = h.support;
   h.position_variance = std::pow(kEdgePositionSigma_m, 2);
@@ -247,20 +272,28 @@ void Relocalizer::update_hypotheses(const Pose& T_body_cam, double age_s) {
     // Poses of a wide search see other contours each.
     if (workspace_->widely && i > 0)
       view.points = view_from(hypotheses_[i].nav.T_map_body, T_body_cam).points;
-    hypotheses_[i] = updated(hypotheses_[i], i < kRefined, view, age_s);
+    const bool refined = i < kRefined || slices_ >= kSlicesWithEdges;
+    hypotheses_[i] = updated(hypotheses_[i], refined, view, age_s);
   }
   for (PoseHypothesis& h : hypotheses_) {
     h.mean_concentration += kNewestWeight * (h.concentration - h.mean_concentration);
     h.mean_support += kNewestWeight * (h.support - h.mean_support);
   }
-  std::stable_sort(
-      hypotheses_.begin(), hypotheses_.end(),
-      [](const PoseHypothesis& a, const PoseHypothesis& b) { return a.mean_support > b.mean_support; });
+  rank_hypotheses();
+  if (slices_ + 1 >= kSlicesWithEdges) keep_hopeful();
+}
+
+void Relocalizer::rank_hypotheses() {
+  std::ranges::stable_sort(hypotheses_, std::ranges::greater{}, &PoseHypothesis::mean_support);
   merge_duplicates(hypotheses_);
-  if (slices_ + 1 < kSlicesWithEdges) return;
+}
+
+void Relocalizer::keep_hopeful() {
+  if (hypotheses_.empty()) return;
   const double least = kHopefulShare * hypotheses_.front().mean_support;
   std::erase_if(hypotheses_, [&](const PoseHypothesis& h) { return h.mean_support < least; });
-  if (hypotheses_.size() > kRefined) hypotheses_.resize(kRefined);
+  const std::size_t most = map_may_be_wrong_ ? kMostTogether : kRefined;
+  if (hypotheses_.size() > most) hypotheses_.resize(most);
 }
 
 PoseHypothesis Relocalizer::updated(const PoseHypothesis& predicted, bool refined, const SearchView& view,
@@ -304,31 +337,14 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
   const auto rival = std::ranges::find_if(
       hypotheses_, [&](const PoseHypothesis& h) { return are_apart(h.nav.T_map_body, best.nav.T_map_body); });
   if (!explains_enough(best)) return false;
+  const bool compete = map_may_be_wrong_ && !workspace_->widely;
+  if (compete && (slices_ < kLastCompeting || best.found < kFoundBy)) return false;
   const double rival_support = rival == hypotheses_.end() ? 0 : rival->mean_support;
   const bool concentrated =
       best.mean_concentration >= kLeastConcentration && best.mean_support >= kLeastLead * rival_support;
   const bool alone =
       best.mean_concentration >= kLowConcentration && best.mean_support >= kClearLead * rival_support;
-  return concentrated || alone;
-}
-
-/// Of a map that has few of the contours, and some where none are, several poses may find support for a
-/// moment: one is believed that searches in other events have found as well. Else the next search begins.
-bool Relocalizer::is_found_again(const PoseHypothesis& best) {
-  const bool again = std::ranges::any_of(earlier_, [&](const Earlier& one) {
-    const Vector6d d = best.nav.T_map_body.minus(one.pose.nav.T_map_body);
-    return one.age_s < kLongestAgo_s && d.head<3>().norm() < kSamePlace_m + kSameVelocity_m_s * one.age_s &&
-           d.tail<3>().norm() < kSamePlace_rad;
-  });
-  if (again) return true;
-  const Eigen::Vector3d& p = best.nav.T_map_body.p;
-  log_detail(text("pose found once at ", p.x(), ", ", p.y(), ", ", p.z(), " m: ", best.support,
-                  " events, concentration ", best.mean_concentration, "; searching again"));
-  if (earlier_.size() == kMostEarlier) earlier_.erase(earlier_.begin());
-  earlier_.push_back({best});
-  ++found_;
-  slices_ = 0;
-  return false;
+  return concentrated || (alone && !compete);
 }
 
 std::vector<Pose> Relocalizer::candidates() const {
@@ -351,17 +367,16 @@ std::optional<Relocalizer::Found> Relocalizer::accept_best() {
   if (!hypotheses_.empty()) {
     const PoseHypothesis& best = hypotheses_.front();
     if (is_accepted(best)) {
-      if (twice_ && !is_found_again(best)) return {};
       const Eigen::Vector3d& p = best.nav.T_map_body.p;
       log_detail(text("pose found at ", p.x(), ", ", p.y(), ", ", p.z(), " m: ", best.support, " events, ",
                       100 * best.explained, " % of all, concentration ", best.mean_concentration));
       searching_ = false;
-      earlier_.clear();
       return Found{best.nav, motion_.angular_rate(best, angular_rate_)};
     }
     if (!candidates().empty()) return {};
     const bool promising = best.mean_concentration >= kLowConcentration;
-    if (slices_ < (promising ? kMostSlices : kLeastSlices + 1)) return {};
+    const int more = map_may_be_wrong_ && !workspace_->widely ? kLastCompeting : 0;
+    if (slices_ < more + (promising ? kMostSlices : kLeastSlices + 1)) return {};
   }
   // Anew, from where the prior has come to, and wider.
   slices_ = 0;

@@ -40,7 +40,7 @@ struct RelocalizerInput {
 /// WideSearch where metres and headings are unknown). The best become hypotheses that are tracked over the
 /// next slices, each refined together with its velocity (HypothesisRefiner). The pose is accepted whose
 /// events concentrate at the contours rather than lie evenly over the gate, and clearly more so than those of
-/// any other.
+/// any other. In a map that states errors, searches in further slices compete with the first.
 class Relocalizer {
  public:
   /// A start pose known better than this, as image motion, needs no search: the tracker's gate reaches it.
@@ -55,9 +55,8 @@ class Relocalizer {
 
   explicit Relocalizer(const RelocalizerScene& scene);
 
-  /// Begins a search around `state`; covariance of its pose as Pose::plus. `was_known`: the pose was tracked
-  /// until now, and in a map that states errors it is left only for one that is found twice.
-  void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance, bool was_known);
+  /// Begins a search around `state`; covariance of its pose as Pose::plus.
+  void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance);
   bool searching() const { return searching_; }
   /// The pose is not where it was searched, at any width of the search.
   bool has_tried_all() const;
@@ -93,11 +92,6 @@ class Relocalizer {
     std::vector<FilteredEvent> compensated;  ///< the slice's events, without rotation
     std::vector<SearchPoint> points;
   };
-  /// A pose that was found and is to be found again, carried on by the IMU.
-  struct Earlier {
-    PoseHypothesis pose;
-    double age_s = 0;
-  };
   double pause_s() const;
   double gap_s() const;
   bool explains_enough(const PoseHypothesis& h) const;
@@ -106,6 +100,11 @@ class Relocalizer {
   SearchView view_from(const Pose& T_map_body, const Pose& T_body_cam);
   bool slice_is_complete(TimeNs t) const;
   void search_around_prior(const Pose& T_body_cam, double age_s);
+  bool searches_compete() const;
+  void search_again(const Pose& T_body_cam, double age_s);
+  void go_on_with_velocity_found();
+  void rank_hypotheses();
+  void keep_hopeful();
   void search_widely(const Pose& T_body_cam, double age_s);
   WidePrior wide_prior() const;
   void add_hypothesis(const PoseGuess& guess, const Eigen::Vector3d& velocity, const Pose& T_body_cam,
@@ -115,7 +114,6 @@ class Relocalizer {
   PoseHypothesis corrected_by_edges(const PoseHypothesis& predicted, const SearchView& view,
                                     double age_s) const;
   bool is_accepted(const PoseHypothesis& best) const;
-  bool is_found_again(const PoseHypothesis& best);
   std::optional<Found> accept_best();
 
   RelocalizerScene scene_;
@@ -131,11 +129,10 @@ class Relocalizer {
   ImuIncrement since_slice_;  ///< motion since the last slice, or since begin_search()
   double elapsed_s_ = 0;      ///< from begin_search() to the last slice
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
+  double velocity_sigma_m_s_ = 0;  ///< of the prior, with which it may have gone off
   int slices_ = 0, searches_ = 0;
-  int found_ = 0;                 ///< so often since begin_search()
-  std::vector<Earlier> earlier_;  ///< the newest last
-  bool map_may_be_wrong_;         ///< it states errors of its contours
-  bool twice_ = false;            ///< the pose has to be found so
+  int draws_ = 0;          ///< of poses around the prior, since begin_search()
+  bool map_may_be_wrong_;  ///< it states errors of its contours
 };
 
 }  // namespace evpose

@@ -77,7 +77,7 @@ def draw_ablation(path, measured):
 
 
 LOCKING = ["locked", "wrong called tracking", "wrong called degraded", "not found", "median s to lock", "median error mm",
-           "search ms p50", "p95"]
+           "search ms p50", "p95", "ever tracking and beyond 3 sigma"]
 
 
 def make_relocalization(bench):

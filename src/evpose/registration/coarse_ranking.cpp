@@ -81,7 +81,8 @@ void CoarseScores::find_entries(const Eigen::Matrix3f& R, const Eigen::Vector3f&
   const float *px = points_.data(), *py = px + count_, *pz = py + count_, *tx = pz + count_,
               *ty = tx + count_, *tz = ty + count_;
   const int plane = columns_ * rows_, width = columns_;
-  constexpr float kRim = kTurns / 2;
+  constexpr int kReach = kTurns / 2;
+  constexpr auto kRim = static_cast<float>(kReach);
   const float last_column = static_cast<float>(columns_) - kRim, last_row = static_cast<float>(rows_) - kRim;
   std::int32_t* entries = entries_.data();
   for (std::size_t i = 0; i < count_; ++i) {
@@ -119,8 +120,9 @@ CoarseScores::Turned CoarseScores::best_turn(const Eigen::Matrix3f& R, const Eig
       for (int column = 0; column < kTurns; ++column) sum[column] += from[column];
   }
   const auto best = static_cast<int>(std::ranges::max_element(sums) - sums.begin());
-  const double x = (best % kTurns - kTurns / 2) / static_cast<double>(cells_per_unit_),
-               y = (best / kTurns - kTurns / 2) / static_cast<double>(cells_per_unit_);
+  const int column = best % kTurns - kTurns / 2, row = best / kTurns - kTurns / 2;
+  const double x = column / static_cast<double>(cells_per_unit_),
+               y = row / static_cast<double>(cells_per_unit_);
   const double total = static_cast<double>(sums[static_cast<std::size_t>(best)] + outside);
   return {{y, -x, 0}, count_ > 0 ? total / static_cast<double>(count_) : 0};
 }

@@ -116,6 +116,8 @@ void add_relocalization(CLI::App& bench, Run& run) {
                    "how the names of the wanted starts begin, as GPS,anywhere; wrong: what cannot be "
                    "tracked; default: all")
       ->delimiter(',');
+  command->add_option("--within", request->within_s, "how long each start is watched, s")
+      ->check(CLI::Range(0.1, 10.0));
   command->add_flag("!--no-imu", request->imu, "leave the IMU out");
   command->add_option("--map", request->selection.map, "of all of them, in place of their true contours");
   command->callback(

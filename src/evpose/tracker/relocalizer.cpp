@@ -206,7 +206,7 @@ void Relocalizer::search_around_prior(const Pose& T_body_cam, double age_s) {
 }
 
 bool Relocalizer::searches_compete() const {
-  return map_may_be_wrong_ && !workspace_->widely && slices_ >= kSlicesWithEdges && slices_ < kLastCompeting;
+  return wants_more_searches() && slices_ >= kSlicesWithEdges && slices_ < kLastCompeting;
 }
 
 /// A map that has few of the contours, and some where none are, lets wrong poses find support, and one search
@@ -292,7 +292,7 @@ void Relocalizer::keep_hopeful() {
   if (hypotheses_.empty()) return;
   const double least = kHopefulShare * hypotheses_.front().mean_support;
   std::erase_if(hypotheses_, [&](const PoseHypothesis& h) { return h.mean_support < least; });
-  const std::size_t most = map_may_be_wrong_ ? kMostTogether : kRefined;
+  const std::size_t most = wants_more_searches() ? kMostTogether : kRefined;
   if (hypotheses_.size() > most) hypotheses_.resize(most);
 }
 
@@ -337,7 +337,7 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
   const auto rival = std::ranges::find_if(
       hypotheses_, [&](const PoseHypothesis& h) { return are_apart(h.nav.T_map_body, best.nav.T_map_body); });
   if (!explains_enough(best)) return false;
-  const bool compete = map_may_be_wrong_ && !workspace_->widely;
+  const bool compete = wants_more_searches();
   if (compete && (slices_ < kLastCompeting || best.found < kFoundBy)) return false;
   const double rival_support = rival == hypotheses_.end() ? 0 : rival->mean_support;
   const bool concentrated =
@@ -375,7 +375,7 @@ std::optional<Relocalizer::Found> Relocalizer::accept_best() {
     }
     if (!candidates().empty()) return {};
     const bool promising = best.mean_concentration >= kLowConcentration;
-    const int more = map_may_be_wrong_ && !workspace_->widely ? kLastCompeting : 0;
+    const int more = wants_more_searches() ? kLastCompeting : 0;
     if (slices_ < more + (promising ? kMostSlices : kLeastSlices + 1)) return {};
   }
   // Anew, from where the prior has come to, and wider.

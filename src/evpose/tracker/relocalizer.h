@@ -100,6 +100,8 @@ class Relocalizer {
   SearchView view_from(const Pose& T_map_body, const Pose& T_body_cam);
   bool slice_is_complete(TimeNs t) const;
   void search_around_prior(const Pose& T_body_cam, double age_s);
+  /// One search is not enough to believe a pose: searches in further slices compete.
+  bool wants_more_searches() const { return map_may_be_wrong_ && !workspace_->widely; }
   bool searches_compete() const;
   void search_again(const Pose& T_body_cam, double age_s);
   void go_on_with_velocity_found();

@@ -13,7 +13,7 @@
 namespace evpose::experiments {
 namespace {
 
-constexpr double kWithin_s = 0.5, kLocked_m = 0.01;
+constexpr double kLocked_m = 0.01;
 constexpr double kUnknownSpeed_m_s = 0.5, kUnknownRate_rad_s = 0.5;  // 1 sigma of a start at rest
 
 /// How far off a start is: by so much in a random direction; with sigmas like those of GPS and a compass; or
@@ -121,11 +121,11 @@ bool is_beyond(const Update& u, const std::vector<TimedPose>& truth) {
   return (e.cwiseAbs().array() > kBeyond_sigmas * sigma.array()).any();
 }
 
-StartOutcome start(const Streams& streams, const StartClass& from, unsigned seed) {
+StartOutcome start(const Streams& streams, const StartClass& from, double within_s, unsigned seed) {
   std::mt19937 random(seed);
   const std::vector<TimedPose>& truth = streams.job.truth;
-  const TimeNs begin = random_begin(truth, kWithin_s, random);
-  const TimeNs end = begin + from_seconds(kWithin_s + 0.01);
+  const TimeNs begin = random_begin(truth, within_s, random);
+  const TimeNs end = begin + from_seconds(within_s + 0.01);
   const auto [packets, imu] = excerpt(streams, begin, end);
   const StartState state = wrong_start(truth, begin, from, middle_of(*streams.job.setup.map), random);
   StartOutcome out;
@@ -133,7 +133,7 @@ StartOutcome start(const Streams& streams, const StartClass& from, unsigned seed
                                  processor_s);
   if (!tracker) return out;
   (*tracker)->on_update([&](const Update& u) {
-    if (u.t > begin + from_seconds(kWithin_s)) return;
+    if (u.t > begin + from_seconds(within_s)) return;
     out.health = u.health;
     if (u.points == 0) out.search_s += u.times.predict_s;
     const bool tracking = u.health == Health::tracking || u.health == Health::degraded;
@@ -154,7 +154,7 @@ std::vector<StartOutcome> start_all(const Streams& streams, const StartClass& fr
   std::vector<StartOutcome> outcomes(static_cast<std::size_t>(request.seeds));
   ThreadPool pool(request.threads);
   pool.for_chunks(outcomes.size(), 1, [&](std::size_t, std::size_t i, std::size_t) {
-    outcomes[i] = start(streams, from, static_cast<unsigned>(1 + i));
+    outcomes[i] = start(streams, from, request.within_s, static_cast<unsigned>(1 + i));
   });
   return outcomes;
 }
@@ -310,7 +310,7 @@ Status print_relocalization(const RelocalizationRequest& request) {
         "median s to lock | median error mm | search ms p50 | p95 | ever "
         "tracking and beyond 3 sigma | worst of these mm "
         "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-        request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, kWithin_s);
+        request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, request.within_s);
   for (std::size_t i = 0; i < all.size(); ++i) print_starts((*recordings)[i].name, all[i], request);
   if (!is_wanted(kWrong, request)) return {};
   std::printf(

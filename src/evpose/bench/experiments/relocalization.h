@@ -11,6 +11,7 @@ struct RelocalizationRequest {
   std::vector<std::string> classes;  ///< how the names of the wanted ones begin; empty: all, and wrong maps
   int threads = 2;
   bool imu = true;
+  double within_s = 0.5;  ///< of the start: so long it is watched
 };
 
 /// Starts from wrong poses anywhere in the recordings: is the pose found, how soon, and is a wrong one ever

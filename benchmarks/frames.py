@@ -6,11 +6,11 @@ import tables
 FRAMES = ("frames.rate_hz=30", "frames.exposure_ms=4")
 DARK = ("frames.rate_hz=30", "frames.exposure_ms=25", "frames.full_well_e=500", "world.lamp_lux=2", "world.window_cd_m2=2")
 # Name: scenario, seconds, settings.
-FLIGHTS = {"hover": ("hover", 4, FRAMES),
+FLIGHTS = {"hover": ("hover", 5, FRAMES),
            "rest, then flight": ("indoor_spiral", 5, (*FRAMES, "trajectory.rest_s=2.5")),
-           "dark": ("indoor_spiral", 3, DARK),
-           "spiral": ("indoor_spiral", 3, FRAMES),
-           "aggressive": ("aggressive", 3, FRAMES)}
+           "dark": ("indoor_spiral", 5, DARK),
+           "spiral": ("indoor_spiral", 5, FRAMES),
+           "aggressive": ("aggressive", 5, FRAMES)}
 SEEDS = (101, 102)  # that no default was chosen on
 USES = {"events alone": "off", "frames alone": "alone", "both": "fused"}
 HEAD = ["flight", "seed", *(f"{name}: ATE mm, ARE deg, NEES/6" for name in USES), "both to the better"]

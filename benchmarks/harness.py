@@ -41,11 +41,17 @@ class Recording:
 class Bench:
     """Where everything is, and what has been measured already."""
 
-    def __init__(self, evpose, microbench, shared, scratch, docs, quick=False, minutes=0):
+    def __init__(self, evpose, microbench, shared, scratch, docs, quick=False, minutes=0, older=None):
         self.evpose, self.microbench, self.shared = (pathlib.Path(p) for p in (evpose, microbench, shared))
         self.scratch, self.docs = pathlib.Path(scratch), pathlib.Path(docs)
-        self.quick, self.minutes = quick, minutes
+        self.quick, self.minutes, self.older = quick, minutes, older
         self._program = None
+
+    def of_older_program(self):
+        """The same with the older program; None if there is none."""
+        if self.older is None:
+            return None
+        return Bench(self.older, self.microbench, self.shared, self.scratch, self.docs, self.quick, self.minutes)
 
     # ---- running programs
 

@@ -7,7 +7,7 @@ import harness
 import paper_evaluation
 import tables
 
-SECONDS = 3
+SECONDS = 5
 SEEDS = (101, 102)  # that no default was chosen on
 LAMPS = (f"lamps.off_at_s={0.4 * SECONDS}", f"lamps.on_at_s={0.7 * SECONDS}")
 # Name: scenario, settings of its own.

@@ -55,6 +55,7 @@ BENCHMARKS = {
     "soak": ("live", "make_soak", "memory of evpose serve over half an hour", "30 min"),
     "simulator-speed": ("simulator_speed", "make", "processor time of the simulator", "5 min"),
     "simulator-peer": ("simulator_peer", "make", "the simulator beside an independent one; its pictures", "10 min"),
+    "simulator-pictures": ("simulator_pictures", "make", "docs/images/simulator_*.png", "3 min"),
     "update-picture": ("pictures", "make_update", "docs/images/update.svg, overlay.png", "10 s"),
     "error-picture": ("error_picture", "make", "docs/images/fusion_error.svg", "10 s"),
     "landing-pictures": ("landing_pictures", "make", "docs/images/landing_*.png", "3 min"),
@@ -79,6 +80,8 @@ def parse():
     parser.add_argument("--fresh", action="store_true", help="measure again what is kept")
     parser.add_argument("--quick", action="store_true",
                         help="a little of each, to see that it works; pages and pictures go to SCRATCH/quick")
+    parser.add_argument("--older", type=pathlib.Path,
+                        help="of simulator-speed: an older evpose, measured beside this one")
     parser.add_argument("--minutes", type=float, default=0,
                         help="of unseen: after which no seed is begun; the same command goes on")
     options = parser.parse_args()
@@ -96,7 +99,7 @@ def main():
         return 0
     docs = options.scratch / "quick" if options.quick else harness.ROOT / "docs"
     bench = harness.Bench(options.evpose, options.microbench, options.shared, options.scratch, docs, options.quick,
-                          options.minutes)
+                          options.minutes, options.older)
     if options.fresh:
         bench.forget()
     failed = []

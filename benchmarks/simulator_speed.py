@@ -2,21 +2,29 @@
 """docs/results/simulator-speed.md: processor time of the simulator per simulated second.
 
 The difference of two flights of different length, so that what is done once per world does not count; that is given apart.
-Where the time goes is sampled by perf (Debian: linux-perf), from the first block on; memory is the peak of flights of 5 and 60 s.
+Where the time goes is sampled by perf (Debian: linux-perf), from the first block on. Memory, pace and disk are those of whole
+flights. With `--older PROGRAM` that is measured as well, and flights that both programs make are tracked by this one.
 """
+import argparse
 import collections
 import os
 import re
 import resource
 import shutil
+import statistics
 import subprocess
+import time
 
+import compare_simulators
 import harness
 import tables
 
 SCENARIOS = ["indoor_spiral", "landing", "outdoor_spiral"]
 SIZES = {"vga": "640x480", "720p": "1280x720"}
 SHORT_S, LONG_S = 0.1, 0.5
+COMPARED = argparse.Namespace(duration=2, size="vga")
+COMPARED_SEEDS = 10
+LONG_FLIGHTS_S = (5, 60)
 
 
 def cpu_s(bench, scenario, size, duration_s):
@@ -41,7 +49,7 @@ def measure(bench, scenario, size):
 # Of functions, by the first that fits; what the compiler has put into another function counts there.
 CLASSES = {
     "luminance of surfaces (texture, light)": r"Texture|luminance|baked_light|ShadeQueue|patch_view",
-    "which surface each pixel shows": r"TileRaster|VisibleTriangles",
+    "which surface each pixel shows": r"TileRaster|VisibleTriangles|Raycaster|embree|rtc[A-Z]",
     "pixels where surfaces meet": r"TileSampler|fraction_above|border",
     "pixels without an event, knots of curves": r"StepIntegrator|SceneView",
     "events: low pass, thresholds, times": r"EventPixels|fast_log|LowPass",
@@ -67,31 +75,69 @@ def profile(bench, size):
     return {name: f"{100 * counts[name] / counts.total():.0f}" for name in [*CLASSES, "else"]}
 
 
-def peak_mib(bench, duration_s):
-    """Peak resident memory of a hover."""
+def long_flight(bench, duration_s):
+    """Peak resident memory in MiB, wall time per simulated second and MiB on the disk of a hover."""
     with bench.folder() as scratch:
         words = ["-q", "simulate", "hover", "-o", scratch / "flight", "--duration", duration_s]
-        for setting in ("size=custom", "width=160", "height=120", "focal_px=95"):
-            words += ["--set", f"camera.{setting}"]
+        for setting in harness.TINY:
+            words += ["--set", setting]
+        start = time.monotonic()
         with subprocess.Popen([str(w) for w in (bench.evpose, *words)], stdout=subprocess.DEVNULL) as child:
             _, status, usage = os.wait4(child.pid, 0)
             child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode != 0:
             raise harness.Failure(f"evpose simulate hover ended with {child.returncode}")
-        return usage.ru_maxrss / 1024
+        written = sum(path.stat().st_size for path in (scratch / "flight").rglob("*") if path.is_file())
+        return [usage.ru_maxrss / 1024, (time.monotonic() - start) / duration_s, written / 2**20]
 
 
-def make(bench):
-    rows = [bench.once(f"simulator speed: {scenario}, {size}", lambda: measure(bench, scenario, size))
+def speeds(bench):
+    """A row of measure() for each scenario and size."""
+    return [bench.once(f"simulator speed: {scenario}, {size}", lambda: measure(bench, scenario, size))
             for scenario in (SCENARIOS[:1] if bench.quick else SCENARIOS)
             for size in (list(SIZES)[:1] if bench.quick else SIZES)]
-    heads = ["scenario", "size", "Mev/s", "CPU s per simulated second", "CPU s for the world"]
+
+
+def profiles(bench):
+    """A row for each class, a column for each size."""
     shares = {size: bench.once(f"simulator profile: {size}", lambda: profile(bench, size))
               for size in (list(SIZES)[:1] if bench.quick else SIZES)}
     parts = [[name, *(share[name] for share in shares.values())] for name in [*CLASSES, "else"]]
-    memory = [[f"{length} s", f"{bench.once(f'simulator memory: {length} s', lambda: peak_mib(bench, length)):.0f}"]
-              for length in ((1, 2) if bench.quick else (5, 60))]
-    return bench.write_page("simulator-speed", {
-        "speed": tables.table(heads, rows),
-        "profile": tables.table([f"{SCENARIOS[0]}, % of CPU", *(SIZES[size] for size in shares)], parts),
-        "memory": tables.table(["hover, 160x120", "peak memory, MiB"], memory)})
+    return tables.table([f"{SCENARIOS[0]}, % of CPU", *(SIZES[size] for size in shares)], parts)
+
+
+def beside(older, now):
+    """Processor time of both programs."""
+    rows = [[*row[:2], row[2], then[2], row[3], then[3], f"{float(then[3]) / float(row[3]):.1f}"]
+            for row, then in zip(now, speeds(older))]
+    return tables.table(["scenario", "size", "Mev/s", "older", "CPU s per simulated second", "older", "times as fast"], rows)
+
+
+def films(older, bench):
+    """Flights of one scenario from ten seeds, made by both programs and tracked by this one."""
+    rows, all_figures = [], []
+    for seed in range(1, (1 if bench.quick else COMPARED_SEEDS) + 1):
+        figures = [bench.once(f"simulator film: {seed}, {harness.digest(program.read_bytes())}", lambda p=program:
+                              compare_simulators.fly(p, bench.evpose, SCENARIOS[0], seed, COMPARED))
+                   for program in (older.evpose, bench.evpose)]
+        all_figures.append(figures)
+        rows.append([str(seed), *(f"{figure:.2f}" for pair in zip(*figures) for figure in pair)])
+    means = [statistics.mean(figures[program][what] for figures in all_figures) for what in (0, 1) for program in (0, 1)]
+    rows.append(["mean", *(f"{mean:.2f}" for mean in means)])
+    rows.append(["change, %", "", f"{100 * (means[1] / means[0] - 1):+.1f}", "", f"{100 * (means[3] / means[2] - 1):+.1f}"])
+    return tables.table(["seed", "million events, older", "now", "mean ATE mm, older", "now"], rows)
+
+
+def make(bench):
+    rows = speeds(bench)
+    heads = ["scenario", "size", "Mev/s", "CPU s per simulated second", "CPU s for the world"]
+    long_flights = [[f"{length} s", *(f"{figure:.1f}" for figure in
+                                      bench.once(f"simulator long: {length} s", lambda: long_flight(bench, length)))]
+                    for length in ((1, 2) if bench.quick else LONG_FLIGHTS_S)]
+    figures = {"speed": tables.table(heads, rows), "profile": profiles(bench),
+               "long flights": tables.table(["hover, 320x240", "peak memory, MiB", "s per simulated second", "MiB on the disk"],
+                                            long_flights)}
+    older = bench.of_older_program()
+    if older is not None:
+        figures |= {"older": beside(older, rows), "older profile": profiles(older), "films": films(older, bench)}
+    return bench.write_page("simulator-speed", figures)

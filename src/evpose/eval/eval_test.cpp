@@ -165,6 +165,30 @@ TEST(Score, LagStandardErrorCoversTheTruthUnderSlowErrors) {
   EXPECT_NEAR(std::sqrt(sum / kRuns), 1, 0.35);
 }
 
+TEST(Score, NeesByDirectionShowsTheDirectionWhoseCovarianceIsTooSmall) {
+  const auto truth = flight_at(1000, 0, 2);
+  auto estimate = flight_at(200, 0, 2);
+  const Eigen::Vector3d sigma_m(1e-3, 2e-3, 5e-3), sigma_rad(3e-3, 1e-3, 1e-3);
+  std::vector<Matrix6d> covariances;
+  for (TimedPose& p : estimate) {
+    const Eigen::Matrix3d R = p.pose.rotation();
+    Matrix6d P = Matrix6d::Zero();
+    P.topLeftCorner<3, 3>() = R * sigma_m.cwiseAbs2().asDiagonal() * R.transpose();
+    P.diagonal().tail<3>() = sigma_rad.cwiseAbs2();
+    covariances.push_back(P);
+    p.pose.p += R * Eigen::Vector3d(0.5e-3, 0, 15e-3);  // half, none and three of its sigma
+    p.pose.q = p.pose.q * so3::exp(Eigen::Vector3d(0, 2e-3, 0));
+  }
+  const TrajectoryScore s = score_trajectory({estimate, truth, covariances, {}, {}}, {});
+  const auto near = [](const Eigen::Vector3d& seen, const Eigen::Vector3d& expected) {
+    EXPECT_LT((seen - expected).norm(), 1e-2 * expected.norm()) << seen.transpose();
+  };
+  near(s.nees_by_direction->position, {0.25, 0, 9});
+  near(s.nees_by_direction->rotation, {0, 4, 0});
+  EXPECT_NEAR(s.nees_by_direction->weakest_position, 9, 0.1);
+  EXPECT_NEAR(s.nees_by_direction->weakest_rotation, 0, 0.1);
+}
+
 TEST(Score, NeesOfErrorsDrawnFromTheCovarianceIsOne) {
   const auto truth = flight_at(1000, 0, 8);
   auto estimate = flight_at(500, 0, 8);
@@ -181,6 +205,12 @@ TEST(Score, NeesOfErrorsDrawnFromTheCovarianceIsOne) {
   const TrajectoryScore s = score_trajectory({estimate, truth, covariances, {}, {}}, {});
   EXPECT_NEAR(*s.nees6_mean, 1, 0.04);
   EXPECT_NEAR(*s.nees6_in_band, 0.95, 0.01);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(s.nees_by_direction->position(i), 1, 0.25);
+    EXPECT_NEAR(s.nees_by_direction->rotation(i), 1, 0.25);
+  }
+  EXPECT_NEAR(s.nees_by_direction->weakest_position, 1, 0.25);
+  EXPECT_NEAR(s.nees_by_direction->weakest_rotation, 1, 0.25);
 
   // Alignment turns the covariance with the estimate's frame.
   const Pose T{so3::exp(Eigen::Vector3d(0.4, 1, -2)), Eigen::Vector3d(1, 2, 3)};

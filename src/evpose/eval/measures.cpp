@@ -2,6 +2,7 @@
 #include "evpose/eval/measures.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -147,22 +148,53 @@ std::optional<double> along_motion(std::span<const ErrorSample> samples,
   return sum_px / count;
 }
 
+namespace {
+
+/// Squared error over its variance in the direction of the largest variance.
+double weakest(const Eigen::Matrix3d& covariance, const Eigen::Vector3d& error) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  return std::pow(error.dot(eigen.eigenvectors().col(2)), 2) / eigen.eigenvalues()(2);
+}
+
+/// Adds what one pose says; position errors are turned into the body's axes.
+void add_directions(const Matrix6d& covariance, const Vector6d& error, const Eigen::Matrix3d& R_map_body,
+                    DirectionNees* sum) {
+  const Eigen::Matrix3d P = R_map_body.transpose() * covariance.topLeftCorner<3, 3>() * R_map_body,
+                        Q = covariance.bottomRightCorner<3, 3>();
+  const Eigen::Vector3d p = R_map_body.transpose() * error.head<3>(), phi = error.tail<3>();
+  sum->position += p.cwiseAbs2().cwiseQuotient(P.diagonal());
+  sum->rotation += phi.cwiseAbs2().cwiseQuotient(Q.diagonal());
+  sum->weakest_position += weakest(P, p);
+  sum->weakest_rotation += weakest(Q, phi);
+}
+
+DirectionNees divided(DirectionNees sum, double count) {
+  sum.position /= count, sum.rotation /= count;
+  sum.weakest_position /= count, sum.weakest_rotation /= count;
+  return sum;
+}
+
+}  // namespace
+
 std::optional<Consistency> consistency(std::span<const ErrorSample> samples,
                                        std::span<const Matrix6d> covariances, const Similarity& alignment) {
   constexpr double kBandLow = 1.237344, kBandHigh = 14.449375;  // 2.5 % and 97.5 % of chi-square, 6 degrees
   double sum = 0;
+  DirectionNees directions;
   int count = 0, in_band = 0;
   for (const ErrorSample& s : samples) {
-    const Eigen::LLT<Matrix6d> factor(alignment.covariance(covariances[s.index]));
+    const Matrix6d P = alignment.covariance(covariances[s.index]);
+    const Eigen::LLT<Matrix6d> factor(P);
     if (factor.info() != Eigen::Success) continue;
     const Vector6d d = s.truth.minus(s.estimate);
     const double nees = factor.matrixL().solve(d).squaredNorm();
     sum += nees;
     in_band += nees >= kBandLow && nees <= kBandHigh;
+    add_directions(P, d, s.estimate.q.toRotationMatrix(), &directions);
     ++count;
   }
   if (count == 0) return std::nullopt;
-  return Consistency{sum / count / 6, static_cast<double>(in_band) / count};
+  return Consistency{sum / count / 6, static_cast<double>(in_band) / count, divided(directions, count)};
 }
 
 }  // namespace evpose

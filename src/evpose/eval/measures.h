@@ -44,6 +44,7 @@ struct Consistency {
   double mean = 0;  ///< NEES / 6
   double share_in_band =
       0;  ///< of single values inside the central 95 % of chi-square with 6 degrees of freedom
+  DirectionNees by_direction;
 };
 /// `covariances` of the poses before alignment, by ErrorSample::index; what is not positive definite is left
 /// out.

@@ -77,6 +77,7 @@ void measure_optional_inputs(const ScoreInput& input, TrajectoryScore* score) {
     if (const auto nees = consistency(samples, input.covariances, T)) {
       score->nees6_mean = nees->mean;
       score->nees6_in_band = nees->share_in_band;
+      score->nees_by_direction = nees->by_direction;
     }
   }
 }
@@ -157,6 +158,14 @@ std::vector<std::pair<std::string, double>> TrajectoryScore::words() const {
   figure("along_motion_px", along_motion_px);
   figure("nees6_mean", nees6_mean);
   figure("nees6_in_band", nees6_in_band);
+  if (const auto& nees = nees_by_direction) {
+    for (const auto& [i, axis] : {std::pair(0, "x"), std::pair(1, "y"), std::pair(2, "z")})
+      out.emplace_back(std::string("nees_position_") + axis, nees->position(i));
+    for (const auto& [i, axis] : {std::pair(0, "x"), std::pair(1, "y"), std::pair(2, "z")})
+      out.emplace_back(std::string("nees_rotation_") + axis, nees->rotation(i));
+    out.emplace_back("nees_position_weakest", nees->weakest_position);
+    out.emplace_back("nees_rotation_weakest", nees->weakest_rotation);
+  }
   figure("jitter_mm", jitter_mm);
   if (alignment == Alignment::sim3) out.emplace_back("scale", T_truth_estimate.scale);
   return out;

@@ -48,6 +48,13 @@ struct ErrorSample {
   double are_deg() const;
 };
 
+/// Means of the squared error over its stated variance, 1 if that tells the truth: in each axis, and in the
+/// direction that is least known. A sum over all axes hides a direction in which the covariance is too small.
+struct DirectionNees {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero(), rotation = Eigen::Vector3d::Zero();  ///< body axes
+  double weakest_position = 0, weakest_rotation = 0;
+};
+
 /// A part of the ground truth's span without an estimate within 20 ms.
 struct Stretch {
   TimeNs from = 0, to = 0;
@@ -76,7 +83,8 @@ struct TrajectoryScore {
   std::optional<double> along_motion_px;        ///< mean error along the motion; > 0: ahead
   std::optional<double> nees6_mean;             ///< NEES / 6: 1 if the covariance tells the truth
   std::optional<double> nees6_in_band;          ///< share of single NEES within the 95 % band, 0..1
-  std::optional<double> jitter_mm;              ///< RMS of consecutive motion minus true motion
+  std::optional<DirectionNees> nees_by_direction;
+  std::optional<double> jitter_mm;  ///< RMS of consecutive motion minus true motion
 
   std::vector<ErrorSample> samples;  ///< the series behind the figures
 

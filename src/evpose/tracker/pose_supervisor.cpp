@@ -104,6 +104,14 @@ Matrix6d PoseSupervisor::doubt() const {
   return out;
 }
 
+Matrix6d PoseSupervisor::told_covariance(const FusionState& reported, const UpdateEvidence& e) {
+  const Matrix6d stated = reported.pose_covariance();
+  if (!map_may_be_wrong_) return stated + doubt();
+  if (!initialised() || searching()) held_.restart();
+  return doubt() +
+         held_.update(stated, reported.nav.T_map_body.q, e.registration.gate_concentration, e.span_s);
+}
+
 /// A pose that was found is believed once its events have concentrated at the contours for a while, and are
 /// clearly more there than beside them.
 bool PoseSupervisor::found_pose_is_refuted(TimeNs t, const RegistrationResult& r) const {

@@ -8,6 +8,7 @@
 #include "evpose/fusion/back_end.h"
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/health.h"
+#include "evpose/tracker/held_covariance.h"
 #include "evpose/tracker/pose_uncertainty.h"
 #include "evpose/tracker/pose_verifier.h"
 #include "evpose/tracker/relocalizer.h"
@@ -81,11 +82,13 @@ class PoseSupervisor {
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
   }
-  /// What is to be added to the pose's covariance while events contradict the pose, while one that was found
-  /// is not verified, or while its contours of one direction lie where no events are.
-  Matrix6d doubt() const;
+  /// The pose's covariance, after judge(): what the fusion states, and more while events contradict the pose,
+  /// while one that was found is not verified, while its contours of one direction lie where no events are,
+  /// and, in a map that states errors, where events that do not gather have made the pose seem better known.
+  Matrix6d told_covariance(const FusionState& reported, const UpdateEvidence& evidence);
 
  private:
+  Matrix6d doubt() const;
   bool verifying() const { return verify_until_ != 0; }
   bool verification_is_over(TimeNs t) const { return verifying() && t >= verify_until_; }
   bool found_pose_is_refuted(TimeNs t, const RegistrationResult& registration) const;
@@ -105,6 +108,7 @@ class PoseSupervisor {
   Relocalizer relocalizer_;
   PoseVerifier verifier_;
   HealthMonitor health_;
+  HeldCovariance held_;
   FusionState before_search_;
   TimeNs verify_until_ = 0;    ///< a pose that was found is watched until then; 0: none
   double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map

@@ -377,13 +377,13 @@ void Tracker::fuse(const RegistrationResult& measurement, std::span<const Sample
 
 void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measurement,
                     const std::string& refused) {
-  Matrix6d covariance = fusion_->reported_state().pose_covariance();
+  const FusionState reported = fusion_->reported_state();
+  const UpdateEvidence evidence{
+      t, span_s, measurement, refused, fault(t, measurement), typical_view(), frames_confirm(t)};
   std::string reason;
-  const Health health = supervisor_.judge(
-      {t, span_s, measurement, refused, fault(t, measurement), typical_view(), frames_confirm(t)}, *fusion_,
-      &reason);
-  covariance += supervisor_.doubt();
-  reporter_.add_judgement(health, std::move(reason), supervisor_.candidates(), covariance);
+  const Health health = supervisor_.judge(evidence, *fusion_, &reason);
+  reporter_.add_judgement(health, std::move(reason), supervisor_.candidates(),
+                          supervisor_.told_covariance(reported, evidence));
 }
 
 /// What is wrong with the data, in words; empty if nothing is.

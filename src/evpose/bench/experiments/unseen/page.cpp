@@ -161,7 +161,8 @@ std::string page(const std::vector<SeedResult>& results, const PageWords& words)
       "itself calls lost count for the share of `tracking` only. "
       "Silently wrong: called `tracking`, and further from the truth than chi-square (6) of the stated "
       "covariance allows as rarely as 5 sigma. ",
-      redrawn(results), "\n\n<!-- figures: all seeds -->\n\n", summary_table(results), "\n<!-- end -->\n\n",
+      "\n\n<!-- figures: redrawn -->\n\n", redrawn(results),
+      "\n\n<!-- end -->\n\n<!-- figures: all seeds -->\n\n", summary_table(results), "\n<!-- end -->\n\n",
       "Mean / median ATE mm by class:\n\n<!-- figures: classes -->\n\n",
       split_table(results, "scene", [](const Draw& d) { return d.scene; }), "\n",
       split_table(results, "motion", [](const Draw& d) { return d.motion; }), "\n",
@@ -169,7 +170,8 @@ std::string page(const std::vector<SeedResult>& results, const PageWords& words)
       "\n<!-- end -->\n\n## Seeds\n\nATE mm, ARE deg, NEES/6, share of `tracking`.\n\n<!-- figures: seeds "
       "-->\n\n",
       seed_table(results), "\n<!-- end -->\n");
-  for (const Given given : {Given::truth, Given::built_map}) out += worst_section(results, given);
+  for (const Given given : {Given::truth, Given::built_map, Given::handed_over})
+    out += worst_section(results, given);
   return out;
 }
 

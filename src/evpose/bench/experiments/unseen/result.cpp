@@ -28,6 +28,7 @@ void visit_figures(auto& run, Visit&& visit) {
   visit("ate_max_mm", run.ate_max_mm);
   visit("are_deg", run.are_deg);
   visit("nees6", run.nees6);
+  visit("nees_by_direction", run.nees_by_direction);
   visit("tracking", run.tracking);
   visit("poses", run.poses);
   visit("silent", run.silent);

@@ -21,7 +21,9 @@ inline constexpr std::array<const char*, kGivens> kGivenKeys{"truth", "built_map
 struct RunFigures {
   std::string fault;  ///< why there are no figures; empty: there are
   double ate_mm = 0, ate_max_mm = 0, are_deg = 0;
-  double nees6 = 0;           ///< mean of NEES / 6
+  double nees6 = 0;  ///< mean of NEES / 6
+  /// Likewise in the position's and the rotation's axes (body), and in the least known direction of each.
+  std::array<double, 8> nees_by_direction{};
   double tracking = 0;        ///< share of the poses
   int poses = 0, silent = 0;  ///< silent: called `tracking` and beyond 5 sigma
   std::string at_end;         ///< health

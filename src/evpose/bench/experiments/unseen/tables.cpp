@@ -42,6 +42,11 @@ std::string heads(const std::string& first) {
   return out + "\n" + line + "\n";
 }
 
+/// Three axes from number `first` on, and the least known direction.
+std::string directions(const std::array<double, 8>& nees, std::size_t first, std::size_t weakest) {
+  return format("%.2f, %.2f, %.2f, %.2f", nees[first], nees[first + 1], nees[first + 2], nees[weakest]);
+}
+
 std::vector<double> ates(const std::vector<SeedResult>& results, std::size_t given) {
   std::vector<double> out;
   for (const SeedResult& r : results)
@@ -130,10 +135,14 @@ Summary summarise(const std::vector<SeedResult>& results, Given given) {
     are_deg.push_back(r.are_deg);
     nees6.push_back(r.nees6);
     out.honest += r.nees6 >= kHonestLow && r.nees6 <= kHonestHigh ? 1 : 0;
+    for (std::size_t i = 0; i < r.nees_by_direction.size(); ++i)
+      out.nees_by_direction[i] += r.nees_by_direction[i];
+    out.weakest_beyond += std::max(r.nees_by_direction[6], r.nees_by_direction[7]) > kHonestHigh ? 1 : 0;
     out.poses += r.poses;
     out.silent_poses += r.silent;
     out.silent_seeds += r.silent > 0 ? 1 : 0;
   }
+  for (double& nees : out.nees_by_direction) nees /= std::max(1, static_cast<int>(ate_mm.size()));
   if (tracked == 0) out.least_tracking = 0;
   out.tracking = tracking / std::max(1, tracked);
   out.ate_mm = distribution(std::move(ate_mm));
@@ -153,6 +162,14 @@ std::string summary_table(const std::vector<SeedResult>& results) {
          row("ARE deg", all, [](const Summary& s) { return spread(s.are_deg, "%.3f"); }) +
          row("NEES/6", all, [](const Summary& s) { return spread(s.nees6, "%.2f"); }) +
          row("seeds with NEES/6 in 0.5 .. 2", all, share) +
+         row("squared error over variance: position x, y, z, least known direction", all,
+             [](const Summary& s) { return directions(s.nees_by_direction, 0, 6); }) +
+         row("the same of the rotation", all,
+             [](const Summary& s) { return directions(s.nees_by_direction, 3, 7); }) +
+         row("seeds with more than 2 in a least known direction", all,
+             [](const Summary& s) {
+               return format("%d of %d", s.weakest_beyond, s.seeds - s.without_figures);
+             }) +
          row("poses called `tracking`: mean, least", all,
              [](const Summary& s) {
                return format("%.1f %%, %.1f %%", 100 * s.tracking, 100 * s.least_tracking);

@@ -20,8 +20,10 @@ Distribution distribution(std::vector<double> values);
 struct Summary {
   int seeds = 0, without_figures = 0;
   Distribution ate_mm, are_deg, nees6;
-  double tracking = 0, least_tracking = 0;  ///< share of the poses: mean over the seeds, and least
-  int honest = 0;                           ///< seeds with NEES/6 within 0.5 .. 2
+  double tracking = 0, least_tracking = 0;    ///< share of the poses: mean over the seeds, and least
+  int honest = 0;                             ///< seeds with NEES/6 within 0.5 .. 2
+  std::array<double, 8> nees_by_direction{};  ///< means over the seeds, as RunFigures
+  int weakest_beyond = 0;  ///< seeds with more than 2 in the least known direction of position or rotation
   int poses = 0, silent_poses = 0, silent_seeds = 0;
 };
 Summary summarise(const std::vector<SeedResult>& results, Given given);

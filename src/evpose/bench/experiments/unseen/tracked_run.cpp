@@ -113,6 +113,9 @@ Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPo
   out.ate_max_mm = score.ate_mm.max;
   out.are_deg = score.are_deg.mean;
   out.nees6 = nees6;
+  if (const auto& d = score.nees_by_direction)
+    out.nees_by_direction = {d->position.x(), d->position.y(), d->position.z(),     d->rotation.x(),
+                             d->rotation.y(), d->rotation.z(), d->weakest_position, d->weakest_rotation};
   for (const ErrorSample& s : score.samples)
     if (stood_by[s.index].health == Health::tracking && is_far(s, stood_by[s.index].covariance)) ++out.silent;
   out.at_end = to_string(poses.back().health);

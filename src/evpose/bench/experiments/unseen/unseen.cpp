@@ -118,7 +118,6 @@ Status Run::track(const unseen::Flight& flight, Given given, SeedResult& result)
   auto run = unseen::track_flight(flight, given, config_);
   if (!run) return run.error();
   result.runs[static_cast<std::size_t>(given)] = run->judgement.figures;
-  if (given == Given::handed_over) return {};
   const std::string beside = request_.output + "/";
   if (Status done = write_text_file(beside + unseen::course_name(result.seed, given),
                                     unseen::course_picture(run->judgement.course));

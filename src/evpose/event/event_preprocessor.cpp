@@ -38,6 +38,8 @@ void EventPreprocessor::rebase(std::uint32_t shift_us) {
   noise_filter_.rebase(shift_us);
   if (surface_) surface_->rebase(shift_us);
   refilled_us_ = refilled_us_ > shift_us ? refilled_us_ - shift_us : 0;
+  if (collected_ != nullptr)
+    for (FilteredEvent& e : *collected_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
   for (FilteredEvent& e : kept_) e.stamp_us = e.stamp_us > shift_us ? e.stamp_us - shift_us : 1;
 }
 
@@ -52,6 +54,10 @@ void EventPreprocessor::take(const EventPacket& packet, std::span<const Event> e
   if (events.empty()) return;
   const std::int64_t base = base_us(packet, events);
   const std::size_t before = kept_.size();
+  if (collected_ != nullptr)
+    for (const Event& e : events)
+      if (e.x < width_ && e.y < height_ && (collected_where_ == nullptr || collected_where_->holds(e.x, e.y)))
+        collected_->push_back(stamped(e, base));
   counts_.read += static_cast<std::int64_t>(events.size());
   if (interest_ != nullptr)
     take_where(events, base, [this](const Event& e) { return interest_->holds(e.x, e.y); });

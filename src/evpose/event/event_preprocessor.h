@@ -47,6 +47,12 @@ class EventPreprocessor {
   std::span<const FilteredEvent> kept() const { return kept_; }
   void clear_kept() { kept_.clear(); }
 
+  /// From now on events are appended to `out` as they come, too, unfiltered; null: no longer. `where`: those
+  /// that matter by this map alone; null: all in the image.
+  void collect(std::vector<FilteredEvent>* out, const InterestMap* where = nullptr) {
+    collected_ = out, collected_where_ = where;
+  }
+
   /// From now on every event is drawn into the time surface, or no longer: those that are handed on while
   /// events matter everywhere, else all, as they are. It begins empty, and keeps what it holds while it is
   /// not drawn into. What is handed on is the same with it and without.
@@ -79,6 +85,8 @@ class EventPreprocessor {
   NoiseFilter noise_filter_;
   std::optional<TimeSurface> surface_;
   bool drawing_ = false;
+  std::vector<FilteredEvent>* collected_ = nullptr;
+  const InterestMap* collected_where_ = nullptr;
   double allowance_ = 0;  ///< events that may come at once now; refilled at the rate's limit
   std::uint32_t refilled_us_ = 0;
   std::vector<FilteredEvent> kept_;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 
 #include "evpose/fusion/fusion_config.h"
 #include "evpose/fusion/state.h"
@@ -33,6 +34,14 @@ struct SeenMeasurement {
   static constexpr int kVelocity = 6, kNumbers = 9;
   Eigen::MatrixXd information;
   Eigen::VectorXd vector;
+};
+
+/// What is measured of the pose and a kept one together: near the present values its cost is
+/// d^T information d / 2 - vector^T d, with d = (pose, kept pose), each as Pose::plus.
+struct RelativeInformation {
+  using Vector = Eigen::Matrix<double, 12, 1>;
+  Eigen::Matrix<double, 12, 12> information = Eigen::Matrix<double, 12, 12>::Zero();
+  Vector vector = Vector::Zero();
 };
 
 /// What the tracker asks of a fusion framework. Time goes forward: start, then predict and update in turn.
@@ -72,6 +81,14 @@ class BackEnd {
   /// Takes what it tells of the pose; more where a framework can.
   virtual void update(const SeenMeasurement& measurement);
   virtual Calibration calibration() const { return {}; }
+
+  /// From now on the state's pose is kept as a further state, in place of one that was kept before. Nothing
+  /// where a framework cannot.
+  virtual void keep_pose() {}
+  /// T_map_body of that time, as it is known now; none: no pose is kept.
+  virtual std::optional<Pose> kept_pose() const { return std::nullopt; }
+  /// Measurement of the pose and the kept one, relative to their present values.
+  virtual void update(const RelativeInformation& /*measurement*/) {}
 
   const StatePropagator& propagator() const { return propagator_; }
 

@@ -15,6 +15,7 @@ Ekf::Ekf(const StatePropagator& propagator, const FusionConfig& config, const Po
 void Ekf::start(const FusionState& first) {
   if (offsets_) offsets_->remove_all(filter_);
   share_of_blocks_.setZero();
+  forget_kept_pose();
   filter_.reset_state(first);
   filter_.follow_shared_errors(SharedErrors::kCount);
   calibration_.start(filter_);
@@ -37,9 +38,8 @@ void Ekf::update(const PoseInformation& measurement, std::span<const ContourOffs
   measurement_.expect_shared_errors(SharedErrors::kCount);
   add_contours(contours);
   filter_.update(measurement_);
-  if (offsets_) offsets_->apply_corrections(filter_);
   if (blocks_take_contours()) share_of_blocks_ = filter_.share_of_blocks(measurement_);
-  apply_calibration();
+  apply_corrections();
 }
 
 void Ekf::update(const SeenMeasurement& measurement) {
@@ -52,12 +52,37 @@ void Ekf::update(const SeenMeasurement& measurement) {
   if (more > 0) blocks.push_back({calibration_.intrinsics().value(), more});
   measurement_.add_blocks(blocks, measurement.information, measurement.vector);
   filter_.update(measurement_);
-  if (offsets_) offsets_->apply_corrections(filter_);
-  apply_calibration();
+  apply_corrections();
   filter_.remove_block(velocity);
 }
 
-void Ekf::apply_calibration() {
+void Ekf::forget_kept_pose() {
+  if (kept_pose_) filter_.remove_block(kept_);
+  kept_pose_.reset();
+}
+
+void Ekf::keep_pose() {
+  forget_kept_pose();
+  kept_ = filter_.add_copy(error_state::kP, 6);
+  kept_pose_ = state().nav.T_map_body;
+}
+
+/// How the camera is mounted is the same at both poses: what it is wrong by hardly moves one beside the
+/// other.
+void Ekf::update(const RelativeInformation& measurement) {
+  if (!kept_pose_) return;
+  measurement_.start({measurement.information.topLeftCorner<6, 6>(), measurement.vector.head<6>()});
+  measurement_.expect_shared_errors(SharedErrors::kCount);
+  const JointMeasurement::SizedBlock kept{kept_, 6};
+  measurement_.add_blocks({&kept, 1}, measurement.information, measurement.vector);
+  filter_.update(measurement_);
+  apply_corrections();
+}
+
+/// Of the blocks, after an update.
+void Ekf::apply_corrections() {
+  if (offsets_) offsets_->apply_corrections(filter_);
+  if (kept_pose_) kept_pose_ = kept_pose_->plus(filter_.correction(kept_));
   Eigen::Vector3d gravity_map = propagator().gravity_map();
   calibration_.apply_corrections(filter_, &gravity_map);
   set_gravity_map(gravity_map);

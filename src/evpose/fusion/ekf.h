@@ -33,6 +33,10 @@ class Ekf : public BackEnd {
   Matrix6d measured_covariance() const override;
   Calibration calibration() const override { return calibration_.calibration(); }
 
+  void keep_pose() override;
+  std::optional<Pose> kept_pose() const override { return kept_pose_; }
+  void update(const RelativeInformation& measurement) override;
+
   const ErrorStateFilter& filter() const { return filter_; }
   /// None if their offsets are no states.
   std::span<const SegmentOffsets::Segment> segments() const;
@@ -40,11 +44,14 @@ class Ekf : public BackEnd {
  private:
   bool blocks_take_contours() const { return offsets_.has_value() || calibration_.takes_contours(); }
   void add_contours(std::span<const ContourOffset> contours);
-  void apply_calibration();
+  void apply_corrections();
+  void forget_kept_pose();
 
   ErrorStateFilter filter_;
   CalibrationStates calibration_;
   std::optional<SegmentOffsets> offsets_;
+  BlockId kept_{};  ///< of kept_pose_
+  std::optional<Pose> kept_pose_;
   JointMeasurement measurement_;  ///< of the last update
   Matrix6d share_of_blocks_ = Matrix6d::Zero();
 };

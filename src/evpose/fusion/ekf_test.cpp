@@ -181,6 +181,61 @@ TEST(Ekf, TheVelocityThatIsMeasuredWithThePoseIsThatOfTheClosedForm) {
 }
 
 /// Both ways of telling the filter what contours say of a camera with other numbers than given.
+/// As the joint Kalman update of state and kept pose says, from the filter's joint covariance before it.
+TEST(Ekf, AKeptPoseAndThePoseAreMeasuredTogether) {
+  Ekf ekf(StatePropagator(MotionModel::imu, {}, {}));
+  ekf.start(0, some_state(), {0, 0, 0});
+  for (int k = 0; k < 20; ++k) {
+    if (k == 5) ekf.keep_pose();
+    ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), ImuTrust::good);
+  }
+  const FusionState before = ekf.state();
+  const Pose kept = *ekf.kept_pose();
+  const Eigen::MatrixXd P = ekf.filter().joint_covariance();
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  RelativeInformation m;
+  for (int i = 0; i < 9; ++i) {
+    const RelativeInformation::Vector h =
+        RelativeInformation::Vector::NullaryExpr([&] { return normal(random); });
+    m.information += 1e5 * h * h.transpose();
+    m.vector += 10 * normal(random) * h;
+  }
+  ekf.update(m);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(P.rows(), P.rows());
+  H.topLeftCorner<6, 6>() = m.information.topLeftCorner<6, 6>();
+  H.topRightCorner<6, 6>() = m.information.topRightCorner<6, 6>();
+  H.bottomLeftCorner<6, 6>() = m.information.bottomLeftCorner<6, 6>();
+  H.bottomRightCorner<6, 6>() = m.information.bottomRightCorner<6, 6>();
+  Eigen::VectorXd b = Eigen::VectorXd::Zero(P.rows());
+  b.head<6>() = m.vector.head<6>(), b.tail<6>() = m.vector.tail<6>();
+  const Eigen::MatrixXd after =
+      (Eigen::MatrixXd::Identity(P.rows(), P.rows()) + P * H).partialPivLu().solve(P);
+  const Eigen::VectorXd dx = after * b;
+  EXPECT_LT((ekf.state().minus(before) - dx.head<15>()).norm(), 1e-6 * dx.norm() + 1e-12);
+  EXPECT_LT((ekf.kept_pose()->minus(kept) - dx.tail<6>()).norm(), 1e-6 * dx.norm() + 1e-12);
+  EXPECT_LT((ekf.state().covariance - after.topLeftCorner<15, 15>()).norm(), 1e-2 * after.norm());
+}
+
+/// However well the motion since then is known, the pose is not known better than the kept one was.
+TEST(Ekf, WhatIsMeasuredBesideAKeptPoseTellsNothingOfWhereItWas) {
+  Ekf ekf(StatePropagator(MotionModel::imu, {}, {}));
+  ekf.start(0, some_state(), {0, 0, 0});
+  ekf.keep_pose();
+  const Matrix6d kept = ekf.state().pose_covariance();
+  for (int k = 0; k < 50; ++k) ekf.predict(sample(k * kNsPerMs), sample((k + 1) * kNsPerMs), ImuTrust::good);
+  RelativeInformation m;  // of the two positions' difference alone
+  constexpr double kStrong = 1e14;
+  for (int i = 0; i < 3; ++i) {
+    RelativeInformation::Vector h = RelativeInformation::Vector::Zero();
+    h(i) = 1, h(6 + i) = -1;
+    m.information += kStrong * h * h.transpose();
+  }
+  ekf.update(m);
+  const Matrix6d now = ekf.state().pose_covariance();
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(now(i, i) / kept(i, i), 1, 1e-3) << i;
+}
+
 TEST(Ekf, PoseAndNumbersMeasuredTogetherAreTheirContours) {
   FusionConfig config;
   config.calibration.intrinsics = true;

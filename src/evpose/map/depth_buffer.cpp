@@ -136,14 +136,29 @@ bool DepthBuffer::hides(const Eigen::Vector3d& point_cam) const {
   return false;
 }
 
-std::optional<std::uint32_t> DepthBuffer::triangle_at(const Eigen::Vector2f& tangents) const {
+/// The cell that holds this direction, if a surface is seen in it.
+std::optional<std::size_t> DepthBuffer::cell_at(const Eigen::Vector2f& tangents) const {
   const auto column = static_cast<int>(std::floor((tangents.x() + tangents_.x()) / cell_));
   const auto row = static_cast<int>(std::floor((tangents.y() + tangents_.y()) / cell_));
   if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return std::nullopt;
   const std::size_t at =
       static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
   if (!(inverse_depths_[at] > 0)) return std::nullopt;
-  return triangles_[surfaces_[at]];
+  return at;
+}
+
+std::optional<std::uint32_t> DepthBuffer::triangle_at(const Eigen::Vector2f& tangents) const {
+  const auto at = cell_at(tangents);
+  if (!at) return std::nullopt;
+  return triangles_[surfaces_[*at]];
+}
+
+std::optional<double> DepthBuffer::depth_at(const Eigen::Vector2f& tangents) const {
+  const auto at = cell_at(tangents);
+  if (!at) return std::nullopt;
+  const float inverse = slopes_[surfaces_[*at]].dot(tangents.homogeneous());
+  if (!(inverse > 0)) return std::nullopt;
+  return 1 / static_cast<double>(inverse);
 }
 
 }  // namespace evpose

@@ -32,12 +32,17 @@ class DepthBuffer {
   /// much nearer silhouette count as hidden: which of the two an event belongs to is open.
   bool hides(const Eigen::Vector3d& point_cam) const;
 
+  /// Depth of the surface that is seen at (x / z, y / z), exactly there, by the nearest cell; none: nothing
+  /// is.
+  std::optional<double> depth_at(const Eigen::Vector2f& tangents) const;
+
   /// The triangle that is seen at (x / z, y / z), by its number in the map, at the nearest cell; none:
   /// nothing is.
   std::optional<std::uint32_t> triangle_at(const Eigen::Vector2f& tangents) const;
 
  private:
   std::size_t draw(Eigen::Vector3f a, Eigen::Vector3f b, Eigen::Vector3f c, const Eigen::Vector3f& slope);
+  std::optional<std::size_t> cell_at(const Eigen::Vector2f& tangents) const;
   std::size_t clip_and_draw(const Eigen::Vector3f* corners);
 
   Eigen::Vector2f tangents_;

@@ -47,6 +47,18 @@ TEST_F(DepthBufferLaws, HidesWhatIsBehindAndNothingElse) {
   EXPECT_FALSE(hides({1.2, 0, 3})) << "beside it";
 }
 
+TEST_F(DepthBufferLaws, TellsTheDepthExactlyWhereItIsAsked) {
+  for (const Eigen::Vector2f& at : {Eigen::Vector2f(0, 0), {0.1034F, -0.2013F}})
+    EXPECT_NEAR(*buffer_.depth_at(at), 2, 1e-5);
+  EXPECT_FALSE(buffer_.depth_at({0.5F, 0.5F})) << "beside the board";
+  EXPECT_FALSE(buffer_.depth_at({3, 0})) << "out of view";
+  const double turn = 0.3;  // the board seen askew: depth along the ray (x, y, 1) of the plane z = 2
+  render_from(Pose{so3::exp({0, turn, 0}), map_.anchor});
+  const Eigen::Vector2f at(-0.2517F, 0.0333F);
+  const double z = std::cos(turn) - std::sin(turn) * static_cast<double>(at.x());  // of the ray, in the map
+  EXPECT_NEAR(*buffer_.depth_at(at), 2 / z, 1e-4);
+}
+
 TEST_F(DepthBufferLaws, NearEdgeOfAThinBoardIsSeenAndItsFarEdgeIsNot) {
   for (double s : {-0.4, 0.0, 0.37}) {
     EXPECT_FALSE(hides({0.5, s, 2.0}));

@@ -28,6 +28,12 @@ Matrix6d join(const Matrix6d& held, const Matrix6d& now) {
 
 }  // namespace
 
+void HeldCovariance::restart(double position_m, double rotation_rad) {
+  held_.reset();
+  first_.diagonal().head<3>().setConstant(position_m * position_m);
+  first_.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad);
+}
+
 Matrix6d HeldCovariance::update(const Matrix6d& covariance, const Eigen::Quaterniond& q_map_body,
                                 double concentration, double span_s) {
   Matrix6d turn = Matrix6d::Identity();
@@ -38,7 +44,7 @@ Matrix6d HeldCovariance::update(const Matrix6d& covariance, const Eigen::Quatern
     const double kept = std::exp(-believed * span_s / kRelease_s);
     held_ = join(kept * *held_ + (1 - kept) * now, now);
   } else {
-    held_ = now;
+    held_ = now + first_;
   }
   return turn.transpose() * *held_ * turn;
 }

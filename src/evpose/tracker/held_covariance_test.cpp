@@ -78,12 +78,15 @@ TEST(HeldCovariance, StaysInTheMapWhereTheBodyTurns) {
   EXPECT_NEAR(told(3, 3), small, 1e-9);
 }
 
-TEST(HeldCovariance, APoseFromElsewhereBeginsAnew) {
+TEST(HeldCovariance, APoseFromElsewhereBeginsAnewWithItsOwnError) {
   const Matrix6d P = 1e-6 * Matrix6d::Identity();
   HeldCovariance held;
   held.update(100 * P, kLevel, kSpread, kSpan_s);
-  held.restart();
-  EXPECT_LT((held.update(P, kLevel, kSpread, kSpan_s) - P).norm(), 1e-12);
+  held.restart(3e-3, 2e-3);
+  Vector6d expected;
+  expected << 10e-6, 10e-6, 10e-6, 5e-6, 5e-6, 5e-6;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_LT((held.update(P, kLevel, kSpread, kSpan_s) - Matrix6d(expected.asDiagonal())).norm(), 1e-12);
 }
 
 }  // namespace

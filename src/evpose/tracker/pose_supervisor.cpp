@@ -16,6 +16,8 @@ constexpr double kContested_s = 0.2;  // of a pose that was verified: one direct
 constexpr double kHopeless_s = 1;     // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
 constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
+// Of one that was found among many: as far off as others explain the events nearly as well.
+constexpr double kFoundPosition_m = 0.03, kFoundRotation_rad = 0.01;
 // A pose that was right slides along the contours that are left.
 constexpr double kSlides_m_s = 0.3, kSlides_rad_s = 0.1;
 constexpr const char* kContradiction =
@@ -106,8 +108,8 @@ Matrix6d PoseSupervisor::doubt() const {
 
 Matrix6d PoseSupervisor::told_covariance(const FusionState& reported, const UpdateEvidence& e) {
   const Matrix6d stated = reported.pose_covariance();
-  if (!map_may_be_wrong_) return stated + doubt();
-  if (!initialised() || searching()) held_.restart();
+  if (searching()) held_.restart(kFoundPosition_m, kFoundRotation_rad);
+  if (!map_may_be_wrong_ || !initialised()) return stated + doubt();
   return doubt() +
          held_.update(stated, reported.nav.T_map_body.q, e.registration.gate_concentration, e.span_s);
 }

@@ -95,6 +95,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       next_update_(start.t + from_seconds(1 / config.rate_hz)),
       last_look_aside_(start.t) {
   keep_time_surface(false);
+  if (follows_landmarks(setup_, config_))
+    landmarks_.emplace(map_.index, *setup_.camera, T_body_cam_);
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const double sigma_px = PoseUncertainty(fusion_->state(), typical_view()).separate_px();
   supervisor_.start(fusion_->state(), sigma_px);
@@ -128,6 +130,7 @@ void Tracker::add_events(const EventPacket& packet) {
 bool Tracker::feed_until(TimeNs t) {
   const bool all = input_.feed_until(t);
   if (forecast_) registration_->look_at(preprocessor_.kept(), preprocessor_.stamp(t));
+  if (landmarks_) landmarks_->look_at(preprocessor_.stamp(t));
   return all;
 }
 
@@ -172,6 +175,7 @@ void Tracker::prepare_update() {
   choose_blocks();
   forecast_.reset();
   interest_.clear();
+  if (landmarks_) landmarks_->prepare(next_update_, preprocessor_);
   looks_aside_ = next_update_ >= last_look_aside_ + kLookAside;
   contours_.choose(fusion_->state().nav.T_map_body);
   page_map();
@@ -182,6 +186,7 @@ void Tracker::prepare_update() {
     const double aside_px = looks_aside_ ? PoseVerifier::kAside_px : 0;
     if (registration_->expect({contours_.samples(), span_s, thinning_, aside_px}, &interest_))
       forecast_ = coming.nav;
+    if (forecast_) expect_landmarks(coming, span_s);
   }
   if (!forecast_) thinning_ = {};
   // Verdicts are asked for of all events; search, alignment and verification look at all of them, unless
@@ -263,6 +268,7 @@ Update Tracker::update(TimeNs t) {
   if (imu_time(t) < from) refused = kTimeIsPast;
   if (refused.empty()) fuse(stpe, registration_->offsets(), frames_ ? frames_->share_of_events() : 1);
   if (fuse_frame(t, aligning, stpe)) refused.clear();
+  follow_landmarks(t, span_s, measures && refused.empty());
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty(), thinning_.share());
   judge(t, span_s, stpe, refused);

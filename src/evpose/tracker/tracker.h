@@ -22,6 +22,7 @@
 #include "evpose/tracker/pose_supervisor.h"
 #include "evpose/tracker/snapshot.h"
 #include "evpose/tracker/start_alignment.h"
+#include "evpose/tracker/texture_landmarks.h"
 #include "evpose/tracker/tracker_config.h"
 #include "evpose/tracker/update.h"
 #include "evpose/tracker/update_reporter.h"
@@ -153,6 +154,8 @@ class Tracker {
   }
   void fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets, double share = 1);
   bool frames_confirm(TimeNs t) const { return frames_ && frames_->confirms(t); }
+  void expect_landmarks(const FusionState& coming, double span_s);
+  void follow_landmarks(TimeNs t, double span_s, bool measured);
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);
   std::string fault(TimeNs t, const RegistrationResult& measurement) const;
 
@@ -178,6 +181,7 @@ class Tracker {
   std::optional<FrameInput> frames_;  ///< none: they are not used
   std::unique_ptr<BackEnd> fusion_;
   PoseSupervisor supervisor_;
+  std::optional<TextureLandmarks> landmarks_;      ///< none: they are not used
   std::optional<StartAlignment> start_alignment_;  ///< until it is done
   int failed_alignments_ = 0;
   TimeNs align_again_ = 0;  ///< not before

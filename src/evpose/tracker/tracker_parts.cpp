@@ -57,6 +57,12 @@ std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const Tr
   return FrameInput(setup.camera->size(), setup.frame_camera, contrast_of_segments(*setup.map, segments));
 }
 
+bool follows_landmarks(const TrackerSetup& setup, const TrackerConfig& config) {
+  return setup.motion == MotionModel::imu && config.fusion.kind == BackEndKind::ekf &&
+         config.registration == RegistrationKind::events && states_errors(*setup.map) &&
+         !setup.map->occluders.triangles.empty();
+}
+
 ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,
                          const ContrastMemory* learnt) {
   ContourMap out = map;

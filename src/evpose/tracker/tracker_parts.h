@@ -22,6 +22,10 @@ std::unique_ptr<Registration> make_registration(const TrackerConfig& config, Ima
 std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const TrackerSetup& setup,
                                            const ContourSegments& segments);
 
+/// Whether edges that the map lacks are followed: it states errors, so that its contours may be too few or
+/// wrong, and has the surfaces that such edges lie on.
+bool follows_landmarks(const TrackerSetup& setup, const TrackerConfig& config);
+
 /// The map with the signs that were learnt; null: none were.
 ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,
                          const ContrastMemory* learnt);

@@ -71,7 +71,7 @@ std::vector<EdgePiece> EdgePieceFinder::find(std::span<const FilteredEvent> even
   }
   std::vector<Scored> found;
   for (const auto& block : blocks_) {
-    Scored best;
+    Scored best{0, {Eigen::Vector2d::Zero(), Eigen::Vector2d::UnitX(), 0, 0}};
     const std::size_t step = std::max<std::size_t>(1, block.size() / kTries);
     for (std::size_t k = 0; k < block.size(); k += step)
       if (const Scored s = piece_at(events[block[k]]); s.score > best.score) best = s;

@@ -115,11 +115,6 @@ void Tracker::add_imu(const ImuSample& sample) {
   make_due_updates();
 }
 
-void Tracker::add_frame(Frame frame) {
-  EVPOSE_CHECK(frame.size == setup_.camera->size());
-  if (frames_) frames_->add(std::move(frame));
-}
-
 void Tracker::add_events(const EventPacket& packet) {
   input_.offer(packet);
   make_due_updates();

@@ -10,6 +10,11 @@ constexpr double kSureByEvents_px = 0.14;
 
 }  // namespace
 
+void Tracker::add_frame(Frame frame) {
+  EVPOSE_CHECK(frame.size == setup_.camera->size());
+  if (frames_) frames_->add(std::move(frame));
+}
+
 /// With a frame that has been exposed since the last update, if there is one and it is believed. Where no
 /// events were used, `measured` becomes what it says.
 bool Tracker::fuse_frame(TimeNs t, bool aligning, RegistrationResult& measured) {

@@ -95,8 +95,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       next_update_(start.t + from_seconds(1 / config.rate_hz)),
       last_look_aside_(start.t) {
   keep_time_surface(false);
-  if (follows_landmarks(setup_, config_))
-    landmarks_.emplace(map_.index, *setup_.camera, T_body_cam_);
+  if (follows_landmarks(setup_, config_)) landmarks_.emplace(map_.index, *setup_.camera, T_body_cam_);
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const double sigma_px = PoseUncertainty(fusion_->state(), typical_view()).separate_px();
   supervisor_.start(fusion_->state(), sigma_px);
@@ -143,6 +142,7 @@ TimeNs Tracker::imu_time(TimeNs t) const { return t + from_seconds(fusion_->cali
 
 void Tracker::make_update() {
   const Update result = update(next_update_);
+  preprocessor_.set_motion(contours_.typical_flow_px_s());
   update_number_ += update_stride_;
   next_update_ = start_t_ + from_seconds(static_cast<double>(update_number_ + 1) / config_.rate_hz);
   if (update_callback_) update_callback_(result);
@@ -267,7 +267,6 @@ Update Tracker::update(TimeNs t) {
   if (supervisor_.initialised() && !supervisor_.searching()) imu_.compare(*fusion_);
   reporter_.add_registration(stpe, innovation, refused.empty(), thinning_.share());
   judge(t, span_s, stpe, refused);
-  preprocessor_.set_motion(contours_.typical_flow_px_s());
   return reporter_.finish(fusion_->reported_state(), preprocessor_.counts());
 }
 

@@ -163,6 +163,8 @@ RelativeInformation TextureLandmarks::measure(const Input& input, const BackEnd&
 void TextureLandmarks::update(const Input& input, BackEnd& fusion) {
   if (!points_body_.empty() && fusion.kept_pose()) fusion.update(measure(input, fusion));
   if (input.t < found_ + kLife) return;
+  if (!slice_.empty() && slice_.front().stamp_us > input.now_us)  // the clock's stamps began anew meanwhile
+    slice_.clear(), slice_begin_.reset();
   slice_.insert(slice_.end(), collected_.begin(), collected_.end());
   if (!slice_begin_) slice_begin_ = input.t - from_seconds(input.span_s);
   const double span_s = to_seconds(input.t - *slice_begin_);

@@ -25,8 +25,7 @@ double side_of_the_rest(const SurfacePoints& surface, const FittedPlane& plane) 
 
 BeyondEdge::BeyondEdge(const SurfacePoints& surface, const Neighbours& tree, const FittedPlane& plane,
                        std::span<const View> views)
-    : surface_(surface),
-      tree_(tree),
+    : tree_(tree),
       plane_(plane),
       views_(views),
       noise_m_(noise_on(surface, plane)),

@@ -41,7 +41,6 @@ class BeyondEdge {
     return edge.begin + (edge.end - edge.begin) * share + out_m * edge.normal_a;
   }
 
-  const SurfacePoints& surface_;
   const Neighbours& tree_;
   const FittedPlane& plane_;
   std::span<const View> views_;

@@ -49,9 +49,9 @@ def measure(bench, scenario, size):
 # Of functions, by the first that fits; what the compiler has put into another function counts there.
 CLASSES = {
     "luminance of surfaces (texture, light)": r"Texture|luminance|baked_light|ShadeQueue|patch_view",
-    "which surface each pixel shows": r"TileRaster|VisibleTriangles|Raycaster|embree|rtc[A-Z]",
+    "which surface each pixel shows": r"TileRaster|VisibleTriangles|RayCaster|embree|rtc[A-Z]",
     "pixels where surfaces meet": r"TileSampler|fraction_above|border",
-    "pixels without an event, knots of curves": r"StepIntegrator|SceneView",
+    "pixels without an event, knots of curves": r"StepIntegrator|PixelIntegrator|SceneView",
     "events: low pass, thresholds, times": r"EventPixels|fast_log|LowPass",
     "sorting and read-out": r"collect|RowRequests|EventQueue|ReadOut|Arbiter|sort",
     "compression and writing": r"libz\.|libhdf5|Writer|Hdf5",
@@ -69,7 +69,7 @@ def profile(bench, size):
                        check=True, capture_output=True)
         lines = subprocess.run(["perf", "script", "-i", data, "-F", "ip,sym,dso"], capture_output=True, text=True,
                                check=True).stdout.splitlines()
-    first = next(i for i, line in enumerate(lines) if "StepIntegrator" in line)
+    first = next(i for i, line in enumerate(lines) if re.search("StepIntegrator|PixelIntegrator", line))
     counts = collections.Counter(next((name for name, pattern in CLASSES.items() if re.search(pattern, line)), "else")
                                  for line in lines[first:])
     return {name: f"{100 * counts[name] / counts.total():.0f}" for name in [*CLASSES, "else"]}

@@ -2,6 +2,7 @@
 """docs/results/learn.md: maps that flights have made better, beside the built and the true ones."""
 import json
 import shutil
+import statistics
 
 import harness
 import tables
@@ -16,6 +17,9 @@ SPLIT = {"courtyard_landing": 2.4, "room_other_view": 1.5, "room_c": 0.65, "room
 # A changed scene: a fifth of the contours of the map that LEARNS has made are moved; then another flight learns. The
 # limits of silence were chosen with the first seed on the first flight.
 CHANGED_SHARE, CHANGED = 0.2, [("room_people", 1), ("room_people", 2), ("room_720p", 3), ("room_720p", 4)]
+
+# Simulated places that nobody has looked at: one flight learns, another with motion and noise of its own is tracked.
+FRESH, LEARNING_S, TRACKED_S = {"indoor_spiral": range(401, 406), "outdoor_spiral": range(406, 411)}, 10, 4
 
 
 def cell(row):
@@ -80,6 +84,31 @@ def measure_split(bench, recording, seconds):
         return {"told": told, "tracked": compare(bench, scratch / "second", recording, scratch / "built.h5", learnt, scratch)}
 
 
+def fresh_flight(bench, scenario, place, own_seed, seconds):
+    settings = ("camera.size=vga", f"seed={own_seed}", f"world.seed={place}", f"trajectory.seed={own_seed}")
+    return bench.simulated(scenario, seconds, settings, f"learn_{scenario}")
+
+
+def measure_fresh(bench, scenario, place):
+    teacher = fresh_flight(bench, scenario, place, place, LEARNING_S)
+    flight = fresh_flight(bench, scenario, place, place + 1000, TRACKED_S)
+    with bench.folder() as scratch:
+        bench.run("map", "build", teacher.folder / "map_raw.ply", "-o", scratch / "built.h5")
+        learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
+        return {"told": told, "tracked": compare(bench, flight.folder, flight, scratch / "built.h5", learnt, scratch)}
+
+
+def fresh_summary(fresh):
+    """Mean and worst of what was tracked to the end with each kind of map."""
+    out = {}
+    for kind in ("built", "learnt", "true"):
+        rows = [m["tracked"][kind] for m in fresh.values() if "ate_mean_mm" in m["tracked"][kind]]
+        errors = [row["ate_mean_mm"] for row in rows]
+        out[kind] = (f"{statistics.mean(errors):.2f}, worst {max(errors):.2f}, NEES/6 {statistics.mean(r['nees'] for r in rows):.2f}"
+                     f" ({len(rows)} of {len(fresh)})") if rows else "-"
+    return out
+
+
 def changes_found(before, changed, moved, unchanged_learnt, learnt):
     """Metres: of contours that the flight sees, moved ones and those of them that left their place; the same of others."""
     before, changed, kept, found = (Contours(path) for path in (before, changed, unchanged_learnt, learnt))
@@ -136,12 +165,17 @@ def make(bench):
              for name, seconds in SPLIT.items() if name in recordings}
     changed = [changed_row(name, seed, bench.once(f"learn: changed {name} {seed}", lambda: measure_changed(bench, name, seed)))
                for name, seed in CHANGED]
+    fresh = {f"{scenario}, {place}": bench.once(f"learn: fresh {scenario} {place}",
+                                                lambda: measure_fresh(bench, scenario, place))
+             for scenario, places in FRESH.items() for place in (places[:1] if bench.quick else places)}
     told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items())]
     heads = ["flight", "s", "views deg apart", "moved, struck, new m", "common sigma mm", "own trajectory mm, deg",
              "processor s per s", "memory MB"]
     return bench.write_page("learn", {
         "other flights": tables.transposed(others["tracked"], cell),
         "second parts": tables.transposed({name: m["tracked"] for name, m in split.items()}, cell),
-        "flights": tables.table(heads, told),
+        "fresh places": [*tables.transposed({name: m["tracked"] for name, m in fresh.items()}, cell),
+                         "| mean | " + " | ".join(fresh_summary(fresh).values()) + " |"],
+        "flights": tables.table(heads, told + [told_row(name, m["told"]) for name, m in fresh.items()]),
         "changed": tables.table(["flight", "seed", "moved m, found", "others m, struck", "as it was", "changed",
                                  "as it was, learnt", "changed, learnt"], changed)})

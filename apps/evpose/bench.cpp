@@ -185,7 +185,8 @@ void add_faults(CLI::App& bench, Run& run) {
 }
 
 void add_realtime(CLI::App& bench, Run& run) {
-  auto* command = bench.add_subcommand("realtime", "Speed and delay at high rates of events, on one core");
+  auto* command = bench.add_subcommand(
+      "realtime", "Speed and delay at high rates of events, from words of EVT3 to poses");
   auto request = std::make_shared<experiments::RealtimeRequest>();
   add_selection(*command, request->selection);
   command->add_option("--mev-s", request->rates_mev_s, "rates of events, with random ones added")
@@ -194,6 +195,10 @@ void add_realtime(CLI::App& bench, Run& run) {
   command->add_option("--updates", request->updates_hz, "updates a second")
       ->delimiter(',')
       ->capture_default_str();
+  command->add_flag("--two-cores", request->two_cores,
+                    "decode beside tracking, and clock by the wall; else processor time of one core");
+  command->add_option("--burst", request->burst_mev_s, "million random events a second more, for 50 ms")
+      ->check(CLI::NonNegativeNumber);
   command->callback([=, &run] { run = [=] { return exit_status(experiments::print_realtime(*request)); }; });
 }
 

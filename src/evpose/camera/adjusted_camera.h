@@ -28,6 +28,7 @@ class AdjustedCamera final : public Camera {
   /// The numbers are the given ones plus `correction`, to within 0.002 px. A correction that makes no camera
   /// leaves the camera as it was, and is answered with false.
   bool set_correction(const Correction& correction);
+  int numbers() const { return static_cast<int>(stepped_.size()); }
   /// At the given numbers; nothing where project() has nothing.
   std::optional<ByNumbers> by_numbers(const Eigen::Vector3d& point_cam) const;
   /// Stays as given.

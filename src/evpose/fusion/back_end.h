@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "evpose/camera/adjusted_camera.h"
 #include "evpose/fusion/fusion_config.h"
 #include "evpose/fusion/state.h"
 #include "evpose/fusion/state_propagator.h"
@@ -36,12 +37,20 @@ struct SeenMeasurement {
   Eigen::VectorXd vector;
 };
 
-/// What is measured of the pose and a kept one together: near the present values its cost is
-/// d^T information d / 2 - vector^T d, with d = (pose, kept pose), each as Pose::plus.
+/// What is measured of the pose and a kept one together, and what that says of the camera: near the present
+/// values its cost is d^T information d / 2 - vector^T d, with d = (pose, kept pose, each as Pose::plus;
+/// Calibration::turn; camera's numbers, where they are states).
 struct RelativeInformation {
-  using Vector = Eigen::Matrix<double, 12, 1>;
-  Eigen::Matrix<double, 12, 12> information = Eigen::Matrix<double, 12, 12>::Zero();
-  Vector vector = Vector::Zero();
+  static constexpr int kPoses = 12, kNumbers = 15;  ///< where turn and numbers begin
+  static constexpr int kMost = kNumbers + AdjustedCamera::kMostNumbers;
+  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMost, 1>;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMost, kMost>;
+  explicit RelativeInformation(int numbers = 0)
+      : information(Matrix::Zero(kNumbers + numbers, kNumbers + numbers)),
+        vector(Vector::Zero(kNumbers + numbers)) {}
+
+  Matrix information;
+  Vector vector;
 };
 
 /// What the tracker asks of a fusion framework. Time goes forward: start, then predict and update in turn.
@@ -87,7 +96,8 @@ class BackEnd {
   virtual void keep_pose() {}
   /// T_map_body of that time, as it is known now; none: no pose is kept.
   virtual std::optional<Pose> kept_pose() const { return std::nullopt; }
-  /// Measurement of the pose and the kept one, relative to their present values.
+  /// Measurement of the pose and the kept one, relative to their present values, and of the camera where that
+  /// is estimated.
   virtual void update(const RelativeInformation& /*measurement*/) {}
 
   const StatePropagator& propagator() const { return propagator_; }

@@ -38,6 +38,8 @@ class CalibrationStates {
   void judge_excitation(ErrorStateFilter& filter);
   /// How the pose that the camera sees depends on the blocks.
   std::vector<PoseShift> pose_shifts(const FusionState& state) const;
+  /// The camera's rotation in the body, if it is a state.
+  std::optional<BlockId> rotation() const { return rotation_; }
   /// The camera's numbers, if they are states.
   std::optional<BlockId> intrinsics() const { return intrinsics_; }
   /// Whether contours have to tell of the camera's numbers.

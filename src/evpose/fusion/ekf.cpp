@@ -2,6 +2,8 @@
 #include "evpose/fusion/ekf.h"
 
 #include <array>
+#include <numeric>
+#include <vector>
 
 #include "evpose/fusion/shared_errors.h"
 
@@ -67,14 +69,22 @@ void Ekf::keep_pose() {
   kept_pose_ = state().nav.T_map_body;
 }
 
-/// How the camera is mounted is the same at both poses: what it is wrong by hardly moves one beside the
-/// other.
 void Ekf::update(const RelativeInformation& measurement) {
   if (!kept_pose_) return;
+  std::vector<JointMeasurement::SizedBlock> blocks{{kept_, 6}};
+  std::vector<int> told(RelativeInformation::kPoses);  // of what was measured, that are states
+  std::iota(told.begin(), told.end(), 0);
+  const auto add = [&](const std::optional<BlockId>& block, int first, int size) {
+    if (!block || size == 0) return;
+    blocks.push_back({*block, size});
+    for (int i = 0; i < size; ++i) told.push_back(first + i);
+  };
+  add(calibration_.rotation(), RelativeInformation::kPoses, 3);
+  add(calibration_.intrinsics(), RelativeInformation::kNumbers,
+      static_cast<int>(measurement.vector.size()) - RelativeInformation::kNumbers);
   measurement_.start({measurement.information.topLeftCorner<6, 6>(), measurement.vector.head<6>()});
   measurement_.expect_shared_errors(SharedErrors::kCount);
-  const JointMeasurement::SizedBlock kept{kept_, 6};
-  measurement_.add_blocks({&kept, 1}, measurement.information, measurement.vector);
+  measurement_.add_blocks(blocks, measurement.information(told, told), measurement.vector(told));
   filter_.update(measurement_);
   apply_corrections();
 }

@@ -196,19 +196,20 @@ TEST(Ekf, AKeptPoseAndThePoseAreMeasuredTogether) {
   std::normal_distribution<double> normal;
   RelativeInformation m;
   for (int i = 0; i < 9; ++i) {
-    const RelativeInformation::Vector h =
-        RelativeInformation::Vector::NullaryExpr([&] { return normal(random); });
+    const RelativeInformation::Vector h = RelativeInformation::Vector::NullaryExpr(
+        RelativeInformation::kNumbers, [&] { return normal(random); });
     m.information += 1e5 * h * h.transpose();
     m.vector += 10 * normal(random) * h;
   }
   ekf.update(m);
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(P.rows(), P.rows());
+  // The camera is no state: what is told of it is left out.
   H.topLeftCorner<6, 6>() = m.information.topLeftCorner<6, 6>();
-  H.topRightCorner<6, 6>() = m.information.topRightCorner<6, 6>();
-  H.bottomLeftCorner<6, 6>() = m.information.bottomLeftCorner<6, 6>();
-  H.bottomRightCorner<6, 6>() = m.information.bottomRightCorner<6, 6>();
+  H.topRightCorner<6, 6>() = m.information.block<6, 6>(0, 6);
+  H.bottomLeftCorner<6, 6>() = m.information.block<6, 6>(6, 0);
+  H.bottomRightCorner<6, 6>() = m.information.block<6, 6>(6, 6);
   Eigen::VectorXd b = Eigen::VectorXd::Zero(P.rows());
-  b.head<6>() = m.vector.head<6>(), b.tail<6>() = m.vector.tail<6>();
+  b.head<6>() = m.vector.head<6>(), b.tail<6>() = m.vector.segment<6>(6);
   const Eigen::MatrixXd after =
       (Eigen::MatrixXd::Identity(P.rows(), P.rows()) + P * H).partialPivLu().solve(P);
   const Eigen::VectorXd dx = after * b;
@@ -227,7 +228,7 @@ TEST(Ekf, WhatIsMeasuredBesideAKeptPoseTellsNothingOfWhereItWas) {
   RelativeInformation m;  // of the two positions' difference alone
   constexpr double kStrong = 1e14;
   for (int i = 0; i < 3; ++i) {
-    RelativeInformation::Vector h = RelativeInformation::Vector::Zero();
+    RelativeInformation::Vector h = RelativeInformation::Vector::Zero(RelativeInformation::kNumbers);
     h(i) = 1, h(6 + i) = -1;
     m.information += kStrong * h * h.transpose();
   }

@@ -167,18 +167,17 @@ void PacketDecoder::take_evt3(const PacketHeader& header, std::span<const std::u
                               std::vector<StreamItem>& out) {
   const auto more = std::as_bytes(bytes);
   words_.insert(words_.end(), more.begin(), more.end());
-  EventBlock block;
   std::size_t at = 0;
   while (true) {
-    block.start();
-    const std::size_t used = evt3_.decode(std::span<const std::byte>(words_).subspan(at), block);
+    block_.start();
+    const std::size_t used = evt3_.decode(std::span<const std::byte>(words_).subspan(at), block_);
     at += used;
-    if (block.count > 0) {
+    if (block_.count > 0) {
       StreamItem item;
       item.kind = StreamItem::Kind::events;
-      item.events.base = header.base + block.base_us * kNsPerUs;
-      item.events.events.assign(block.events.begin(),
-                                block.events.begin() + static_cast<std::ptrdiff_t>(block.count));
+      item.events.base = header.base + block_.base_us * kNsPerUs;
+      item.events.events.assign(block_.events.begin(),
+                                block_.events.begin() + static_cast<std::ptrdiff_t>(block_.count));
       out.push_back(std::move(item));
     }
     if (used == 0) break;

@@ -64,6 +64,7 @@ class PacketDecoder {
   Evt3Decoder evt3_;
   std::vector<std::uint8_t> buffer_;  ///< of a stream: less than a packet
   std::vector<std::byte> words_;      ///< of evt3: what the decoder has not taken yet
+  EventBlock block_;                  ///< likewise: room for events
   std::optional<std::uint32_t> sequence_;
   Counts counts_;
 };

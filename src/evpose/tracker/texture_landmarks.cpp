@@ -8,29 +8,14 @@
 namespace evpose {
 namespace {
 
-constexpr TimeNs kLife = 100 * kNsPerMs;                 // of landmarks
-constexpr double kSlice_px = 2, kLongestSlice_s = 0.03;  // motion in a slice, or its length
-constexpr double kCell_px = 3;                           // of the depths
-constexpr double kNear_m = 0.1, kWidestTangent = 3;
+constexpr TimeNs kLife = 100 * kNsPerMs;                   // of landmarks
+constexpr TimeNs kSearch = 10 * kNsPerMs;                  // of this, until they are found
+constexpr double kSlice_px = 2, kLongestSlice_s = 0.03;    // motion in a slice, or its length
 constexpr double kBesidePiece_px = 3, kAlongPiece_px = 2;  // where the surface has to be the same
 constexpr double kSameSurface = 0.03;                      // of the depth
 constexpr int kFewestSeen = 10;                            // landmarks with events
 constexpr double kGate_px = 0.7;
 constexpr double kShared_px = 0.35, kShared_s = 0.1;  // errors of a landmark's place last as long as itself
-
-/// Out to where the camera sees, on the plane at unit depth.
-Eigen::Vector2d tangents_of(const Camera& camera) {
-  const double right = camera.size().width - 1, bottom = camera.size().height - 1;
-  Eigen::Vector2d out(0.1, 0.1);
-  for (const double u : {0.0, 0.5, 1.0})
-    for (const double v : {0.0, 0.5, 1.0}) {
-      const auto ray = camera.unproject({u * right, v * bottom});
-      if (ray && ray->z() > 0) out = out.cwiseMax(ray->head<2>().cwiseAbs() / ray->z());
-    }
-  return out.cwiseMin(kWidestTangent);
-}
-
-double cell_of(const Camera& camera) { return kCell_px * 2 * tangents_of(camera).x() / camera.size().width; }
 
 EventRegistrationConfig registration_config() {
   EventRegistrationConfig out;
@@ -44,22 +29,25 @@ EventRegistrationConfig registration_config() {
 
 }  // namespace
 
-TextureLandmarks::TextureLandmarks(const ContourIndex& index, const Camera& camera, const Pose& T_body_cam)
-    : index_(index),
-      camera_(camera),
+TextureLandmarks::TextureLandmarks(const ContourIndex& index, const Camera& camera, const Pose& T_body_cam,
+                                   const AdjustedCamera* adjusted)
+    : camera_(camera),
       T_body_cam_(T_body_cam),
-      depths_(tangents_of(camera), cell_of(camera)),
-      finder_(camera.size()),
-      near_(camera.size().width, camera.size().height) {}
+      adjusted_(adjusted),
+      near_(camera.size().width, camera.size().height),
+      search_(index, camera) {}
 
 void TextureLandmarks::restart() {
-  points_body_.clear(), tangents_body_.clear(), map_.points.clear();
-  slice_.clear(), slice_begin_.reset();
+  landmarks_.clear(), map_.points.clear();
+  collected_.clear(), slice_.clear(), slice_begin_.reset();
+  seen_from_.reset();
   expected_ = false;
   found_ = 0;
 }
 
 void TextureLandmarks::prepare(TimeNs next_update, EventPreprocessor& events) {
+  if (finding()) search_.launch();
+  if (finding() && next_update >= found_ + kSearch) take_found();
   expected_ = false;
   near_.clear();
   collected_.clear();
@@ -67,7 +55,7 @@ void TextureLandmarks::prepare(TimeNs next_update, EventPreprocessor& events) {
 }
 
 void TextureLandmarks::expect(const FusionState& coming, double span_s, const Pose& found_at) {
-  if (points_body_.empty()) return;
+  if (landmarks_.empty()) return;
   project(coming, span_s, found_at);
   expected_ = registration_->expect({samples_, span_s}, &near_);
 }
@@ -81,13 +69,13 @@ std::optional<Eigen::Vector3d> TextureLandmarks::surface_at(const Eigen::Vector2
   const auto ray = camera_.unproject(pixel);
   if (!ray || !(ray->z() > 0)) return std::nullopt;
   const Eigen::Vector3d at_unit_depth = *ray / ray->z();
-  const auto depth_m = depths_.depth_at(at_unit_depth.head<2>().cast<float>());
+  const auto depth_m = search_.depths().depth_at(at_unit_depth.head<2>().cast<float>());
   if (!depth_m) return std::nullopt;
   return Eigen::Vector3d(*depth_m * at_unit_depth);
 }
 
 /// Pieces at the rim of a surface are left out: it is not known of which surface they are.
-void TextureLandmarks::place(const EdgePiece& piece, const Pose& T_body_cam_then) {
+void TextureLandmarks::place(const EdgePiece& piece) {
   const Eigen::Vector2d &n = piece.normal, t(-n.y(), n.x());
   const auto middle = surface_at(piece.pixel), along = surface_at(piece.pixel + kAlongPiece_px * t);
   if (!middle || !along) return;
@@ -99,37 +87,48 @@ void TextureLandmarks::place(const EdgePiece& piece, const Pose& T_body_cam_then
     return;
   Matrix23d by_point;
   if (!camera_.project(*middle, &by_point)) return;
-  points_body_.push_back(T_body_cam_then * *middle);
-  tangents_body_.push_back((T_body_cam_then.q * (*along - *middle)).normalized());
+  const Pose& now = seen_from_->nav.T_map_body;
+  const Pose then{now.q * so3::exp(-piece.age_s * seen_from_->angular_rate),
+                  now.p - piece.age_s * seen_from_->nav.velocity};
+  landmarks_.push_back({piece.pixel, middle->z(), now.inverse() * then, *middle / middle->z(),
+                        (*along - *middle).normalized()});
   ContourPoint point;
   point.position.setZero();  // project() places it
   point.sigma = static_cast<float>(piece.sigma_px / (n.transpose() * by_point).norm());
   map_.points.push_back(point);
 }
 
-/// In the events that were collected.
-void TextureLandmarks::find(const Input& input, const FusionState& state) {
-  const std::vector<EdgePiece> pieces = finder_.find(slice_, input.now_us);
+/// In the events that were collected. None are followed meanwhile.
+void TextureLandmarks::find(const Input& input, BackEnd& fusion) {
+  const FusionState& state = fusion.state();
+  search_.begin(slice_, input.now_us, state.nav.T_map_body * T_body_cam_);
   restart();
   found_ = input.t;
-  const Pose& now = state.nav.T_map_body;
-  map_.anchor = now.p;
-  depths_.render(index_.map(), now * T_body_cam_, kNear_m);
-  for (const EdgePiece& piece : pieces) {
-    const Pose then{now.q * so3::exp(-piece.age_s * state.angular_rate),
-                    now.p - piece.age_s * state.nav.velocity};
-    place(piece, now.inverse() * then * T_body_cam_);
-  }
-  segments_.of_point.resize(points_body_.size());
+  seen_from_ = state;
+  fusion.keep_pose();
+}
+
+void TextureLandmarks::take_found() {
+  search_.finish();
+  map_.anchor = seen_from_->nav.T_map_body.p;
+  for (const EdgePiece& piece : search_.pieces()) place(piece);
+  seen_from_.reset();
+  segments_.of_point.resize(landmarks_.size());
   std::iota(segments_.of_point.begin(), segments_.of_point.end(), 0u);
-  segments_.count = static_cast<std::uint32_t>(points_body_.size());
+  segments_.count = static_cast<std::uint32_t>(landmarks_.size());
   registration_.emplace(camera_.size(), registration_config(), std::max(1u, segments_.count));
 }
 
 void TextureLandmarks::project(const FusionState& state, double span_s, const Pose& found_at) {
-  for (std::size_t i = 0; i < points_body_.size(); ++i) {
-    map_.points[i].position = (found_at * points_body_[i] - map_.anchor).cast<float>();
-    map_.points[i].tangent = (found_at.q * tangents_body_[i]).cast<float>();
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    Landmark& landmark = landmarks_[i];
+    if (adjusted_ != nullptr)
+      if (const auto ray = camera_.unproject(landmark.pixel); ray && ray->z() > 0)
+        landmark.ray = *ray / ray->z();
+    const Pose T_map_cam = found_at * landmark.T_kept_then * T_body_cam_;
+    const Eigen::Vector3d point_cam = landmark.depth_m * landmark.ray;
+    map_.points[i].position = (T_map_cam * point_cam - map_.anchor).cast<float>();
+    map_.points[i].tangent = (T_map_cam.q * landmark.tangent_cam).cast<float>();
   }
   project_contours({map_, segments_, camera_, T_body_cam_, 0}, segments_.of_point,
                    {state.nav.T_map_body, state.nav.velocity, state.angular_rate}, span_s, samples_);
@@ -145,14 +144,14 @@ RelativeInformation TextureLandmarks::measure(const Input& input, const BackEnd&
   if (expected_ && input.forecast != nullptr)
     problem.forecast = {state.nav.T_map_body.minus(input.forecast->T_map_body),
                         state.nav.velocity - input.forecast->velocity};
-  RelativeInformation out;
+  RelativeInformation out(adjusted_ == nullptr ? 0 : adjusted_->numbers());
   if (registration_->measure(problem).inliers < kFewestSeen) return out;
-  const Eigen::Matrix3d R = found_at.rotation();
   for (const SampleOffset& offset : registration_->offsets()) {
     const ContourSample& s = samples_[offset.sample];
-    const Eigen::RowVector3d by_point = -s.jacobian.head<3>().transpose();  // the camera moves, or the point
-    RelativeInformation::Vector h;
-    h << s.jacobian, by_point.transpose(), -(by_point * R * so3::hat(points_body_[s.point])).transpose();
+    const Landmark& landmark = landmarks_[s.point];
+    const LandmarkView view{state.nav.T_map_body, found_at, landmark.T_kept_then, T_body_cam_,
+                            landmark.depth_m * landmark.ray};
+    const auto h = landmark_row(view, s.jacobian, s.normal_px, adjusted_);
     out.information.selfadjointView<Eigen::Lower>().rankUpdate(h, offset.weight);
     out.vector += offset.weight * offset.offset_px * h;
   }
@@ -161,16 +160,14 @@ RelativeInformation TextureLandmarks::measure(const Input& input, const BackEnd&
 }
 
 void TextureLandmarks::update(const Input& input, BackEnd& fusion) {
-  if (!points_body_.empty() && fusion.kept_pose()) fusion.update(measure(input, fusion));
-  if (input.t < found_ + kLife) return;
+  if (!landmarks_.empty() && fusion.kept_pose()) fusion.update(measure(input, fusion));
+  if (finding() || input.t < found_ + kLife) return;
   if (!slice_.empty() && slice_.front().stamp_us > input.now_us)  // the clock's stamps began anew meanwhile
     slice_.clear(), slice_begin_.reset();
   slice_.insert(slice_.end(), collected_.begin(), collected_.end());
   if (!slice_begin_) slice_begin_ = input.t - from_seconds(input.span_s);
   const double span_s = to_seconds(input.t - *slice_begin_);
-  if (span_s * input.flow_px_s < kSlice_px && span_s < kLongestSlice_s) return;
-  find(input, fusion.state());
-  fusion.keep_pose();
+  if (span_s * input.flow_px_s >= kSlice_px || span_s >= kLongestSlice_s) find(input, fusion);
 }
 
 }  // namespace evpose

@@ -22,7 +22,7 @@ class BeforeAWall : public ::testing::Test {
       : camera_(*make_camera({200, 200, 159.5, 119.5, "none", {}, {320, 240}})),
         map_(wall()),
         index_(map_),
-        landmarks_(index_, *camera_, T_body_cam_) {
+        landmarks_(index_, *camera_, T_body_cam_, nullptr) {
     std::uniform_real_distribution<double> across(-2, 2), turn(0, M_PI);
     for (int i = 0; i < 60; ++i) lines_.push_back({{across(random_), across(random_)}, turn(random_)});
   }

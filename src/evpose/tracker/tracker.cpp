@@ -95,7 +95,8 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       next_update_(start.t + from_seconds(1 / config.rate_hz)),
       last_look_aside_(start.t) {
   keep_time_surface(false);
-  if (follows_landmarks(setup_, config_)) landmarks_.emplace(map_.index, *setup_.camera, T_body_cam_);
+  if (follows_landmarks(setup_, config_))
+    landmarks_.emplace(map_.index, *setup_.camera, T_body_cam_, adjusted_.get());
   fusion_->start(start.t, {start.T_map_body, start.velocity}, start.angular_rate_body);
   const double sigma_px = PoseUncertainty(fusion_->state(), typical_view()).separate_px();
   supervisor_.start(fusion_->state(), sigma_px);
@@ -170,11 +171,12 @@ void Tracker::prepare_update() {
   choose_blocks();
   forecast_.reset();
   interest_.clear();
-  if (landmarks_) landmarks_->prepare(next_update_, preprocessor_);
+  const bool measures = !supervisor_.searching() && !start_alignment_;
+  prepare_landmarks(measures);
   looks_aside_ = next_update_ >= last_look_aside_ + kLookAside;
   contours_.choose(fusion_->state().nav.T_map_body);
   page_map();
-  if (update_number_ > 0 && !supervisor_.searching() && !start_alignment_) {
+  if (update_number_ > 0 && measures) {
     const FusionState coming = forecast();
     const double span_s = to_seconds(next_update_ - last_update_);
     project_samples(coming, span_s);
@@ -216,6 +218,7 @@ void Tracker::page_map() {
   const bool may_take = !contours_.choosing() && !supervisor_.searching() && !start_alignment_;
   const auto next = pager_.next(fusion_->state().nav.T_map_body.p, map_, may_take);
   if (!next) return;
+  if (landmarks_) landmarks_->let_go_of_map();
   setup_.map = next->prepared.map;
   map_ = std::move(next->prepared);
   contours_.renumber(next->point_now);
@@ -227,10 +230,9 @@ void Tracker::page_map() {
 /// The contours as the prediction has them, unless they are as the forecast had them but for a small change.
 void Tracker::see_contours(double span_s) {
   const FusionState& state = fusion_->state();
-  if (forecast_) {
-    const Vector6d change = state.nav.T_map_body.minus(forecast_->T_map_body);
-    if (contours_.largest_shift_px(change) < kForecastHolds_px) return;
-  }
+  if (forecast_ &&
+      contours_.largest_shift_px(state.nav.T_map_body.minus(forecast_->T_map_body)) < kForecastHolds_px)
+    return;
   forecast_.reset();
   project_samples(state, span_s);
 }

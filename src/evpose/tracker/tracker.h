@@ -154,6 +154,7 @@ class Tracker {
   }
   void fuse(const RegistrationResult& measurement, std::span<const SampleOffset> offsets, double share = 1);
   bool frames_confirm(TimeNs t) const { return frames_ && frames_->confirms(t); }
+  void prepare_landmarks(bool measures);
   void expect_landmarks(const FusionState& coming, double span_s);
   void follow_landmarks(TimeNs t, double span_s, bool measured);
   void judge(TimeNs t, double span_s, const RegistrationResult& measurement, const std::string& refused);

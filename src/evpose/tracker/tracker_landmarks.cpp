@@ -4,6 +4,15 @@
 
 namespace evpose {
 
+/// Once a pose is out: what is to be collected for the next.
+void Tracker::prepare_landmarks(bool measures) {
+  if (!landmarks_) return;
+  if (measures)
+    landmarks_->prepare(next_update_, preprocessor_);
+  else
+    preprocessor_.collect(nullptr);
+}
+
 /// Before the events of the next update come.
 void Tracker::expect_landmarks(const FusionState& coming, double span_s) {
   const auto found_at = fusion_->kept_pose();

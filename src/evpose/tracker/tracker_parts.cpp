@@ -57,11 +57,10 @@ std::optional<FrameInput> make_frame_input(const TrackerConfig& config, const Tr
   return FrameInput(setup.camera->size(), setup.frame_camera, contrast_of_segments(*setup.map, segments));
 }
 
-/// They lie where they were seen by the camera as it was known then: it may not be corrected meanwhile.
 bool follows_landmarks(const TrackerSetup& setup, const TrackerConfig& config) {
   return setup.motion == MotionModel::imu && config.fusion.kind == BackEndKind::ekf &&
-         !config.fusion.calibration.any() && config.registration == RegistrationKind::events &&
-         states_errors(*setup.map) && !setup.map->occluders.triangles.empty();
+         config.registration == RegistrationKind::events && states_errors(*setup.map) &&
+         !setup.map->occluders.triangles.empty();
 }
 
 ContourMap with_contrast(const ContourMap& map, const ContourSegments& segments,

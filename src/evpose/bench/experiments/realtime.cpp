@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <future>
 
 #include "evpose/eval/score.h"
 #include "evpose/eval/statistics.h"
+#include "evpose/io/events/evt3_encoder.h"
+#include "evpose/serve/packets.h"
 #include "evpose/serve/replay_source.h"
 
 namespace evpose::experiments {
@@ -16,11 +19,12 @@ namespace {
 constexpr TimeNs kPacket = kNsPerMs;
 constexpr TimeNs kWarm =
     100 * kNsPerMs;  // the start is not counted: its memory is touched for the first time
+constexpr TimeNs kBurst = 50 * kNsPerMs;
 
-/// Processor time of this thread: what else the machine does is not counted.
-double clock_s() {
+/// Processor time of this thread, which does not count what else the machine does; or of the wall.
+double clock_s(clockid_t clock) {
   timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  clock_gettime(clock, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
@@ -37,50 +41,106 @@ struct Figures {
   Health at_end = Health::waiting;
 };
 
+/// A camera's driver: the recording's packets with random events added, as words of EVT3.
+class Driver {
+ public:
+  Driver(const Streams& streams, double rate_mev_s, double burst_mev_s)
+      : streams_(streams),
+        noise_per_s_(std::max(0.0, 1e6 * (rate_mev_s - rate_of(streams.packets)))),
+        burst_per_s_(1e6 * burst_mev_s) {
+    const TimeNs middle = (streams.packets.front().base + streams.packets.back().base) / 2;
+    burst_begin_ = middle - kBurst / 2;
+  }
+
+  std::size_t packets() const { return streams_.packets.size(); }
+  TimeNs base(std::size_t number) const { return streams_.packets[number].base; }
+
+  std::vector<std::uint8_t> datagram(std::size_t number) {
+    EventPacket packet = streams_.packets[number];
+    const bool bursts = packet.base >= burst_begin_ && packet.base < burst_begin_ + kBurst;
+    add_random_events(packet, streams_.job.recording.camera.size, packet.base + kPacket,
+                      noise_per_s_ + (bursts ? burst_per_s_ : 0), random_);
+    std::vector<std::uint16_t> words;
+    encoder_.encode(packet.events, (packet.base - base(0)) / kNsPerUs, words);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(words.data());
+    return encode_evt3_packet({bytes, 2 * words.size()}, base(0), static_cast<std::uint32_t>(number));
+  }
+
+ private:
+  const Streams& streams_;
+  double noise_per_s_, burst_per_s_;
+  TimeNs burst_begin_;
+  Evt3Encoder encoder_;
+  std::uint64_t random_ = 1;
+};
+
 /// Feeds packet by packet, as they would come, and clocks each.
 class Run {
  public:
-  Run(const Streams& streams, double rate_mev_s) : streams_(streams) {
-    noise_per_s_ = std::max(0.0, 1e6 * (rate_mev_s - rate_of(streams.packets)));
-  }
+  Run(const Streams& streams, const RealtimeRequest& request, double rate_mev_s)
+      : streams_(streams),
+        driver_(streams, rate_mev_s, request.burst_mev_s),
+        decoder_(streams.job.recording.camera.size),
+        two_cores_(request.two_cores) {}
 
   Expected<Figures> track(const TrackerConfig& config) {
     auto tracker = Tracker::create(streams_.job.setup, config, streams_.job.start);
     if (!tracker) return tracker.error();
     (*tracker)->on_update([this](const Update& u) { add(u); });
-    auto imu = streams_.imu.begin();
-    for (const EventPacket& own : streams_.packets) {
-      EventPacket packet = own;
-      const TimeNs end = packet.base + kPacket;
-      add_random_events(packet, streams_.job.recording.camera.size, end, noise_per_s_, random_);
-      if (packet.empty()) continue;
-      const bool counted = packet.base > streams_.job.start.t + kWarm;
-      for (; imu != streams_.imu.end() && imu->t <= end + kPacket; ++imu) (*tracker)->add_imu(*imu);
-      const double began_s = waited_from_s_ = clock_s();
-      (*tracker)->add_events(packet);
-      if (!counted) continue;
-      out_.busy_s += clock_s() - began_s;
-      out_.data_s += to_seconds(kPacket);
-      out_.events += static_cast<double>(packet.events.size());
-    }
+    std::vector<StreamItem> now;
+    for (std::size_t number = 0; number <= driver_.packets(); ++number) now = step(**tracker, now, number);
     out_.shed = static_cast<double>((*tracker)->events().counts().shed);
     out_.score = score_trajectory({poses_, streams_.job.truth, covariances_, {}, {}}, {});
     return out_;
   }
 
  private:
+  double now_s() const { return clock_s(two_cores_ ? CLOCK_MONOTONIC : CLOCK_THREAD_CPUTIME_ID); }
+
+  /// Tracks a packet's events while the next one is decoded.
+  std::vector<StreamItem> step(Tracker& tracker, const std::vector<StreamItem>& now, std::size_t next) {
+    const bool more = next < driver_.packets();
+    const auto words = more ? driver_.datagram(next) : std::vector<std::uint8_t>{};
+    const double began_s = now_s();
+    auto decoded = std::async(two_cores_ ? std::launch::async : std::launch::deferred, [&] {
+      std::vector<StreamItem> items;
+      if (more) decoder_.datagram(words, items);
+      return items;
+    });
+    feed(tracker, now);
+    std::vector<StreamItem> out = decoded.get();
+    if (!more || driver_.base(next) <= streams_.job.start.t + kWarm) return out;
+    out_.busy_s += now_s() - began_s;
+    out_.data_s += to_seconds(kPacket);
+    for (const StreamItem& item : out) out_.events += static_cast<double>(item.events.events.size());
+    return out;
+  }
+
+  void feed(Tracker& tracker, const std::vector<StreamItem>& items) {
+    for (const StreamItem& item : items) {
+      if (item.events.empty()) continue;
+      const TimeNs end = item.events.time(item.events.events.back());
+      for (; imu_ < streams_.imu.size() && streams_.imu[imu_].t <= end + 2 * kPacket; ++imu_)
+        tracker.add_imu(streams_.imu[imu_]);
+      waited_from_s_ = now_s();
+      tracker.add_events(item.events);
+    }
+  }
+
   void add(const Update& u) {
     poses_.push_back({u.t, u.T_map_body});
     covariances_.push_back(u.covariance);
     out_.at_end = u.health;
-    if (u.t > streams_.job.start.t + kWarm) out_.delay_ms.push_back(1e3 * (clock_s() - waited_from_s_));
-    waited_from_s_ = clock_s();
+    if (u.t > streams_.job.start.t + kWarm) out_.delay_ms.push_back(1e3 * (now_s() - waited_from_s_));
+    waited_from_s_ = now_s();
   }
 
   const Streams& streams_;
-  double noise_per_s_;
+  Driver driver_;
+  PacketDecoder decoder_;
+  bool two_cores_;
+  std::size_t imu_ = 0;
   double waited_from_s_ = 0;  ///< the packet came, or the last update of its time was made
-  std::uint64_t random_ = 1;
   Figures out_;
   std::vector<TimedPose> poses_;
   std::vector<Matrix6d> covariances_;
@@ -105,7 +165,7 @@ Status print_recording(const BenchRecording& recording, const RealtimeRequest& r
   for (const double rate_mev_s : request.rates_mev_s)
     for (const double updates_hz : request.updates_hz) {
       config->tracker.rate_hz = updates_hz;
-      const auto figures = Run(*streams, rate_mev_s).track(config->tracker);
+      const auto figures = Run(*streams, request, rate_mev_s).track(config->tracker);
       if (!figures) return figures.error();
       const double own = rate_of(streams->packets);
       print_row(recording.name, streams->job.recording.camera.size, std::max(own, rate_mev_s), updates_hz,

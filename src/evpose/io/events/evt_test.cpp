@@ -6,6 +6,7 @@
 
 #include "evpose/io/events/evt2.h"
 #include "evpose/io/events/evt3.h"
+#include "evpose/io/events/evt3_encoder.h"
 
 namespace evpose {
 namespace {
@@ -110,6 +111,27 @@ TEST(Evt3, EventsOutsideOfTheImageAreDroppedAndCounted) {
                                           {0x400F}}));
   EXPECT_EQ(rows, (std::vector<Row>{{0, 99, 49, 1}, {0, 98, 49, 0}, {0, 99, 49, 0}}));
   EXPECT_EQ(decoder.faults().outside, 4);
+}
+
+TEST(Evt3, WhatIsEncodedIsDecoded) {
+  std::mt19937 random(5);
+  std::vector<Row> rows;
+  Words words;
+  Evt3Encoder encoder;
+  std::int64_t base_us = 3000;
+  for (int packet = 0; packet < 40; ++packet) {
+    std::vector<Event> events;
+    for (std::uint32_t t_us = 0; events.size() < 50; t_us += random() % 4 == 0 ? random() % 3000 : 0) {
+      events.push_back(make_event(t_us, static_cast<int>(random() % 1280), static_cast<int>(random() % 5),
+                                  random() % 2 == 0));
+      const Event& e = events.back();
+      rows.push_back({base_us + t_us, e.x, e.y, e.on});
+    }
+    encoder.encode(events, base_us, words);
+    base_us += events.back().dt_us + (packet == 20 ? 9'000'000 : 100);  // a pause of more than half the clock
+  }
+  ASSERT_GT(base_us, 1 << 23);
+  EXPECT_EQ(decode(words, {1280, 720}), rows);
 }
 
 TEST(Evt3, TriggersAndOtherWords) {

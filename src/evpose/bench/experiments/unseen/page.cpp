@@ -170,8 +170,7 @@ std::string page(const std::vector<SeedResult>& results, const PageWords& words)
       "\n<!-- end -->\n\n## Seeds\n\nATE mm, ARE deg, NEES/6, share of `tracking`.\n\n<!-- figures: seeds "
       "-->\n\n",
       seed_table(results), "\n<!-- end -->\n");
-  for (const Given given : {Given::truth, Given::built_map, Given::handed_over})
-    out += worst_section(results, given);
+  for (const Given given : kGivenKinds) out += worst_section(results, given);
   return out;
 }
 

@@ -11,11 +11,12 @@
 namespace evpose::experiments::unseen {
 
 /// What a flight is tracked with.
-enum class Given { truth, built_map, handed_over };
-inline constexpr std::size_t kGivens = 3;
-inline constexpr std::array<const char*, kGivens> kGivenNames{"true contours", "built map",
-                                                              "handed-over calibration"};
-inline constexpr std::array<const char*, kGivens> kGivenKeys{"truth", "built_map", "handed_over"};
+enum class Given { truth, built_map, handed_over, both };
+inline constexpr std::array kGivenKinds{Given::truth, Given::built_map, Given::handed_over, Given::both};
+inline constexpr std::size_t kGivens = kGivenKinds.size();
+inline constexpr std::array<const char*, kGivens> kGivenNames{
+    "true contours", "built map", "handed-over calibration", "built map and handed-over calibration"};
+inline constexpr std::array<const char*, kGivens> kGivenKeys{"truth", "built_map", "handed_over", "both"};
 
 /// One run, judged 0.3 s after its start.
 struct RunFigures {

@@ -68,13 +68,16 @@ class WorstMoment {
   std::optional<Snapshot> snapshot_;
 };
 
+bool has_built_map(Given given) { return given == Given::built_map || given == Given::both; }
+
 TrackRequest request_of(const Flight& flight, Given given) {
   TrackRequest request;
   request.recording = flight.folder;
   request.init = "groundtruth";
-  request.map = given == Given::built_map ? flight.map_path() : flight.contours_path();
-  if (given != Given::built_map) request.occluders = flight.mesh_path();
-  if (given != Given::handed_over) request.calibration = flight.true_calibration_path();
+  request.map = has_built_map(given) ? flight.map_path() : flight.contours_path();
+  if (!has_built_map(given)) request.occluders = flight.mesh_path();
+  if (given == Given::truth || given == Given::built_map)
+    request.calibration = flight.true_calibration_path();
   return request;
 }
 
@@ -124,7 +127,7 @@ Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPo
 }
 
 Expected<TrackedRun> track_flight(const Flight& flight, Given given, const RunConfig& config) {
-  if (given == Given::built_map && !flight.map_fault.empty()) return without_figures(flight.map_fault);
+  if (has_built_map(given) && !flight.map_fault.empty()) return without_figures(flight.map_fault);
   const auto job = prepare(request_of(flight, given), config);
   if (!job) return job.error();
   const auto tracker = Tracker::create(job->setup, job->config.tracker, job->start);

@@ -143,7 +143,7 @@ Expected<SeedResult> Run::make_result(int seed) const {
   result.refused = flight->refused;
   result.duration_s = flight->duration_s;
   result.mev_s = flight->mev_s;
-  for (const Given given : {Given::truth, Given::built_map, Given::handed_over})
+  for (const Given given : unseen::kGivenKinds)
     if (Status done = track(*flight, given, result); !done) return done.error();
   std::error_code ignored;
   if (!kept) fs::remove_all(folder, ignored);
@@ -159,8 +159,8 @@ void Run::keep(Expected<SeedResult> result) {
     return;
   }
   const auto& runs = result->runs;
-  std::printf("seed %d: %s; %s: ATE %.2f, %.2f, %.2f mm\n", result->seed, result->draw.scene.c_str(),
-              result->draw.motion.c_str(), runs[0].ate_mm, runs[1].ate_mm, runs[2].ate_mm);
+  std::printf("seed %d: %s; %s: ATE %.2f, %.2f, %.2f, %.2f mm\n", result->seed, result->draw.scene.c_str(),
+              result->draw.motion.c_str(), runs[0].ate_mm, runs[1].ate_mm, runs[2].ate_mm, runs[3].ate_mm);
   std::fflush(stdout);
   results_.emplace(result->seed, *std::move(result));
 }

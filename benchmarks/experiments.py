@@ -5,6 +5,7 @@ import re
 
 import drawing
 import harness
+import learn
 import tables
 
 FLIGHT_S, LANDING_S = 5, 8
@@ -13,6 +14,7 @@ FLIGHTS = [("indoor_spiral_720p", "indoor_spiral", "720p", FLIGHT_S), ("landing_
            *((name, name, "vga", FLIGHT_S) for name in ("people", "hdr_window", "turning_3", "landing", "outdoor_spiral",
                                                         "speed_1", "speed_3"))]
 UNSEEN_SEEDS = 40
+LONG_CUT, LONG_CUT_S = ["indoor_spiral", "outdoor_spiral"], 5  # kidnapped on the flights of 10 s that learn makes
 MOVING = {"fan": ("camera.size=vga",), "people": ("camera.size=vga",), "car": tuple(harness.TINY)}
 BAR, BAR_WEAK, BAR_END_MM = "#1f77d0", "#a9c4e2", 4
 
@@ -98,7 +100,14 @@ def make_kidnapping(bench):
     seeds, only = (1, "room_spiral") if bench.quick else (10, "room_spiral,courtyard_landing")
     printed = bench.once(f"kidnap: {seeds}", lambda: bench.run("bench", "kidnap", bench.shared / "data/peer", "--seeds", seeds,
                                                                "--only", only))
-    return bench.write_page("kidnapping", {"kidnap": printed.strip().splitlines()})
+    cut_s, places = (0.1, 1) if bench.quick else (LONG_CUT_S, 25)
+    lines = []
+    for scenario in LONG_CUT:
+        flight = learn.fresh_flight(bench, scenario, learn.FRESH[scenario][0], learn.FRESH[scenario][0], learn.LEARNING_S)
+        words = ("bench", "kidnap", flight.folder.parent, "--only", flight.folder.name, "--seeds", places, "--cut-s", cut_s)
+        rows = bench.once(f"kidnap: {scenario}, {cut_s} s", lambda w=words: bench.run(*w)).strip().splitlines()
+        lines += rows[-1:] if lines else rows
+    return bench.write_page("kidnapping", {"kidnap": printed.strip().splitlines(), "long": lines})
 
 
 def make_faults(bench):

@@ -125,11 +125,13 @@ bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) 
   return searching() || t < verify_until_ || found_pose_is_refuted(t, r);
 }
 
-/// Contours of a map that may be wrong can lie where no events are at the right pose, too, and a change of
-/// the light hides where they gather. A search would then leave it for one that only looks better.
+/// Contours of a map that may be wrong can lie where no events are at the right pose, too. A search would
+/// then leave it for one that only looks better: one that was given is left where events do not gather at it,
+/// one that was verified not even then, since a change of the light hides where they gather.
 bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const {
-  const bool refuted = is_contradicted() || (!r.consistent && !verified_);
-  return (refuted && !(verified_ && map_may_be_wrong_)) || (health == Health::lost && !verifying());
+  const bool refuted =
+      map_may_be_wrong_ ? !r.consistent && !verified_ : is_contradicted() || (!r.consistent && !verified_);
+  return refuted || (health == Health::lost && !verifying());
 }
 
 bool PoseSupervisor::is_astray_for_long() const { return astray_s_ > kPatience_s; }

@@ -266,5 +266,29 @@ TEST_F(BadInput, WhereContoursStandOffIsLearntFromTheirEvents) {
   EXPECT_LT(learnt, 0.6 * plain) << plain;
 }
 
+ContourMap joined(ContourMap map, std::initializer_list<unsigned> seeds) {
+  for (const unsigned seed : seeds)
+    for (ContourPoint p : boxes(seed).points) {
+      p.contour += 1000 * seed;
+      map.points.push_back(p);
+    }
+  return map;
+}
+
+/// The world has as many edges that the map lacks as the map has contours that are none, which contradicts
+/// the pose; but at what both have events gather.
+TEST_F(BadInput, APoseThatWasGivenIsNotLeftWhereAMapThatStatesErrorsHasContoursThatAreNone) {
+  ContourMap map = joined(boxes(), {20, 21, 22, 23, 24, 25, 26, 27});
+  for (ContourPoint& p : map.points) p.sigma = 0.004F;
+  setup_.map = std::make_shared<ContourMap>(map);
+  config_.relocalization.on = true;
+  fly(joined(boxes(), {40, 41, 42, 43}), 1.5);
+  EXPECT_TRUE(said("not in this map")) << all_reasons();
+  for (const Update& u : updates_) {
+    EXPECT_NE(u.health, Health::lost) << to_seconds(u.t) << all_reasons();
+    EXPECT_LT(error_m(u), 4 * sigma_m(u)) << to_seconds(u.t);
+  }
+}
+
 }  // namespace
 }  // namespace evpose

@@ -61,10 +61,10 @@ class BeforeAWall : public ::testing::Test {
   }
 
   /// Tracks for that long by the landmarks and a perfect IMU alone, from a velocity that is wrong.
-  Ekf track(const Eigen::Vector3d& error_m_s, TimeNs until) {
-    FusionConfig config;
+  Ekf track(const Eigen::Vector3d& error_m_s, TimeNs until, FusionConfig config = {}) {
     config.start_velocity_sigma_m_s = 0.1;
-    Ekf ekf(StatePropagator(MotionModel::imu, config, {}));
+    const Pose given = T_body_cam_;
+    Ekf ekf(StatePropagator(MotionModel::imu, config, {}), config, given);
     ekf.start(0, {{}, velocity_ + error_m_s}, {0, 0, 0});
     EventPreprocessor preprocessor(camera_->size().width, camera_->size().height, {});
     const InterestMap nowhere(camera_->size().width, camera_->size().height);
@@ -81,6 +81,7 @@ class BeforeAWall : public ::testing::Test {
       landmarks_.look_at(now_us);
       ekf.predict({t, {0, 0, 0}, -kGravity}, {t + kUpdate, {0, 0, 0}, -kGravity}, ImuTrust::good);
       landmarks_.update({t + kUpdate, now_us, to_seconds(kUpdate), &coming.nav, 60}, ekf);
+      T_body_cam_.q = ekf.calibration().turn * given.q;
       most_ = std::max(most_, landmarks_.size());
     }
     return ekf;
@@ -116,6 +117,23 @@ TEST_F(BeforeAWall, LandmarksTellNothingOfWhereTheCameraIs) {
   const Ekf ekf = track({0, 0, 0}, 300 * kNsPerMs);
   const Matrix6d P = ekf.state().pose_covariance();
   for (int i = 0; i < 3; ++i) EXPECT_GT(std::sqrt(P(i, i)), 0.95 * config.start_position_sigma_m) << i;
+}
+
+/// A camera that is turned in the body sees the body move another way. What is known of the turn belongs to
+/// what is known of the velocity.
+TEST_F(BeforeAWall, WhatTheCameraIsTurnedByIsInTheVelocitysSigma) {
+  constexpr double kTurned_rad = 0.06;
+  T_body_cam_.q = so3::exp(Eigen::Vector3d(0.7, -0.7, 0) * kTurned_rad);
+  FusionConfig config;
+  config.calibration.rotation = true;
+  config.calibration.start_rotation_sigma_rad.setConstant(0.05);
+  const Ekf ekf = track({0, 0, 0}, 600 * kNsPerMs, config);
+  EXPECT_GT(most_, 30u);
+  const FusionState& state = ekf.state();
+  const Eigen::Vector3d error = state.nav.velocity - velocity_;
+  const Eigen::Vector3d sigma =
+      state.covariance.block<3, 3>(error_state::kV, error_state::kV).diagonal().cwiseSqrt();
+  for (int i = 0; i < 3; ++i) EXPECT_LT(std::abs(error(i)), 4 * sigma(i)) << i;
 }
 
 TEST_F(BeforeAWall, WithoutSurfacesThereAreNone) {

@@ -85,7 +85,7 @@ def measure_split(bench, recording, seconds):
 
 
 def fresh_flight(bench, scenario, place, own_seed, seconds):
-    settings = ("camera.size=vga", f"seed={own_seed}", f"world.seed={place}", f"trajectory.seed={own_seed}")
+    settings = (*harness.TINY, "lidar.on=true", f"seed={own_seed}", f"world.seed={place}", f"trajectory.seed={own_seed}")
     return bench.simulated(scenario, seconds, settings, f"learn_{scenario}")
 
 

@@ -9,6 +9,7 @@ namespace evpose {
 namespace {
 
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
+constexpr double kPatienceWithGiven_s = 1;  // with one that was given, in a map that states errors
 constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
 constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
 constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
@@ -134,7 +135,13 @@ bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const
   return refuted || (health == Health::lost && !verifying());
 }
 
-bool PoseSupervisor::is_astray_for_long() const { return astray_s_ > kPatience_s; }
+bool PoseSupervisor::is_astray_for_long() const {
+  return astray_s_ > kPatience_s || doubted_s_ > kPatienceWithGiven_s;
+}
+
+bool PoseSupervisor::should_be_searched_beside() const {
+  return is_astray_for_long() || doubted_s_ > kPatience_s;
+}
 
 std::string PoseSupervisor::refusal(TimeNs t, const RegistrationResult& r, double innovation) const {
   if (searching() || found_pose_is_refuted(t, r)) return "searching for the pose";
@@ -163,7 +170,7 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
   before_search_ = fusion.state();
   relocalizer_.begin_search(t, fusion.state().nav, around);
   verifier_.restart();
-  astray_s_ = 0;
+  astray_s_ = doubted_s_ = 0;
 }
 
 Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::string* reason) {
@@ -192,6 +199,8 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   if (is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
   const Health health = health_.judge(evidence, reason);
   astray_s_ = !e.frames_confirm && is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
+  doubted_s_ =
+      !e.frames_confirm && map_may_be_wrong_ && !verified_ && is_contradicted() ? doubted_s_ + e.span_s : 0;
   if (verification_is_over(e.t) && (verified_ || refuted)) verify_until_ = 0;
   if (refuted) resume_search(e.t, fusion);
   if (config_.on && !searching() && is_astray_for_long()) begin_search(e.t, fusion, state.pose_covariance());

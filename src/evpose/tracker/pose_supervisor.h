@@ -48,7 +48,7 @@ class PoseSupervisor {
   /// The pose has to be searched, and is not: the start is too unsure, or the pose has been lost or refuted
   /// for long.
   bool needs_search() const {
-    return !config_.on && !searching() && ((start_is_unsure_ && !verified_) || is_astray_for_long());
+    return !config_.on && !searching() && ((start_is_unsure_ && !verified_) || should_be_searched_beside());
   }
   /// From now on a pose that gets lost is left to needs_search().
   void search_no_more() { config_.on = false; }
@@ -99,6 +99,7 @@ class PoseSupervisor {
   bool is_hopeless() const;
   bool is_astray(const RegistrationResult& registration, Health health) const;
   bool is_astray_for_long() const;
+  bool should_be_searched_beside() const;
   void resume_search(TimeNs t, BackEnd& fusion);
   void begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance);
 
@@ -112,6 +113,7 @@ class PoseSupervisor {
   FusionState before_search_;
   TimeNs verify_until_ = 0;    ///< a pose that was found is watched until then; 0: none
   double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map
+  double doubted_s_ = 0;       ///< for how long in a row one that was given has been contradicted
   double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
   double contested_s_ = 0;     ///< for how long in a row one direction's contours have had none
   double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it

@@ -276,13 +276,13 @@ ContourMap joined(ContourMap map, std::initializer_list<unsigned> seeds) {
 }
 
 /// The world has as many edges that the map lacks as the map has contours that are none, which contradicts
-/// the pose; but at what both have events gather.
+/// the pose; but at what both have events gather. So it is kept for a second more.
 TEST_F(BadInput, APoseThatWasGivenIsNotLeftWhereAMapThatStatesErrorsHasContoursThatAreNone) {
   ContourMap map = joined(boxes(), {20, 21, 22, 23, 24, 25, 26, 27});
   for (ContourPoint& p : map.points) p.sigma = 0.004F;
   setup_.map = std::make_shared<ContourMap>(map);
   config_.relocalization.on = true;
-  fly(joined(boxes(), {40, 41, 42, 43}), 1.5);
+  fly(joined(boxes(), {40, 41, 42, 43}), 1.0);
   EXPECT_TRUE(said("not in this map")) << all_reasons();
   for (const Update& u : updates_) {
     EXPECT_NE(u.health, Health::lost) << to_seconds(u.t) << all_reasons();

@@ -162,7 +162,8 @@ void Run::keep(Expected<SeedResult> result) {
   std::printf("seed %d: %s; %s: ATE %.2f, %.2f, %.2f, %.2f mm\n", result->seed, result->draw.scene.c_str(),
               result->draw.motion.c_str(), runs[0].ate_mm, runs[1].ate_mm, runs[2].ate_mm, runs[3].ate_mm);
   std::fflush(stdout);
-  results_.emplace(result->seed, *std::move(result));
+  const int seed = result->seed;
+  results_.emplace(seed, *std::move(result));
 }
 
 void Run::work_on(int seed) {

@@ -106,6 +106,7 @@ def make_kidnapping(bench):
         flight = learn.fresh_flight(bench, scenario, learn.FRESH[scenario][0], learn.FRESH[scenario][0], learn.LEARNING_S)
         words = ("bench", "kidnap", flight.folder.parent, "--only", flight.folder.name, "--seeds", places, "--cut-s", cut_s)
         rows = bench.once(f"kidnap: {scenario}, {cut_s} s", lambda w=words: bench.run(*w)).strip().splitlines()
+        rows[-1] = rows[-1].replace(flight.folder.name, f"`{flight.name}`")
         lines += rows[-1:] if lines else rows
     return bench.write_page("kidnapping", {"kidnap": printed.strip().splitlines(), "long": lines})
 

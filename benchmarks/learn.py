@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/learn.md: maps that flights have made better, beside the built and the true ones."""
 import json
+import re
 import shutil
 import statistics
 
@@ -44,7 +45,7 @@ def learn(bench, built, folder, truth, scratch):
         bench.run("map", "learn", built, folder, "-o", learnt, "--trajectories", scratch / "flights", "--init", "groundtruth",
                   "--set", "fusion.calibration.on=false")
     except harness.Failure as why:
-        return None, {"refused": str(why).split(": ", 2)[-1]}
+        return None, {"refused": re.sub(r"^\S+: ", "", str(why).split(": ", 2)[-1])}  # without the recording's folder
     told = json.loads((scratch / "learnt.h5.json").read_text())
     own = json.loads(bench.run("eval", scratch / "flights/flight_0.tum", truth, "--from", harness.START_S, "--json"))
     return learnt, {**told["flights"][0], "own": own.get("accuracy", own), "processor_s": told["processor_s"],

@@ -56,11 +56,10 @@ class TextureLandmarks {
   std::size_t size() const { return landmarks_.size(); }
 
  private:
-  /// Body frame: that of the time when they were found.
   struct Landmark {
     Eigen::Vector2d pixel;  ///< at the mean time of its events
     double depth_m;         ///< there and then
-    Pose T_kept_then;       ///< of the body at that time
+    Pose T_kept_then;       ///< of the body, from then to when the pose was kept
     Eigen::Vector3d ray;    ///< of the pixel, at unit depth
     Eigen::Vector3d tangent_cam;
   };

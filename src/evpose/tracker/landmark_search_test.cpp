@@ -23,7 +23,7 @@ class LandmarkSearchLaws : public ::testing::Test {
       const int at = x(random_), first = y(random_);
       for (int k = 0; k < 12 && first + k < 230; ++k) {
         FilteredEvent e{};
-        e.x = static_cast<std::uint16_t>(at), e.y = static_cast<std::uint16_t>(first + k);
+        e.x = static_cast<std::uint16_t>(at), e.y = (first + k) & 0x7FFF;
         e.on = 1;
         e.stamp_us = 1000 + static_cast<std::uint32_t>(10 * line + k);
         out.push_back(e);

@@ -121,7 +121,8 @@ TEST(Evt3, WhatIsEncodedIsDecoded) {
   std::int64_t base_us = 3000;
   for (int packet = 0; packet < 40; ++packet) {
     std::vector<Event> events;
-    for (std::uint32_t t_us = 0; events.size() < 50; t_us += random() % 4 == 0 ? random() % 3000 : 0) {
+    for (std::uint32_t t_us = 0; events.size() < 50;
+         t_us += random() % 4 == 0 ? static_cast<std::uint32_t>(random() % 3000) : 0) {
       events.push_back(make_event(t_us, static_cast<int>(random() % 1280), static_cast<int>(random() % 5),
                                   random() % 2 == 0));
       const Event& e = events.back();

@@ -58,14 +58,22 @@ TEST_F(LandmarkSearchLaws, FindsTheSameBesideAndAtTheEnd) {
   }
 }
 
+/// What was begun before and not asked for leaves nothing behind.
 TEST_F(LandmarkSearchLaws, OneThatNobodyAsksForIsGivenUp) {
   const ContourIndex index(map_);
-  LandmarkSearch search(index, *camera_);
-  for (int round = 0; round < 3; ++round) {
-    std::vector<FilteredEvent> events = slice();
-    search.begin(events, 2000, {});
-    search.launch();
-  }
+  LandmarkSearch search(index, *camera_), alone(index, *camera_);
+  std::vector<FilteredEvent> events = slice();
+  search.begin(events, 2000, {});
+  search.launch();
+  std::vector<FilteredEvent> one = slice(), other = one;
+  search.begin(one, 2000, {});
+  search.launch();
+  alone.begin(other, 2000, {});
+  search.finish(), alone.finish();
+  ASSERT_GT(search.pieces().size(), 10u);
+  ASSERT_EQ(search.pieces().size(), alone.pieces().size());
+  for (std::size_t i = 0; i < alone.pieces().size(); ++i)
+    EXPECT_EQ(search.pieces()[i].pixel, alone.pieces()[i].pixel) << i;
 }
 
 }  // namespace

@@ -19,8 +19,8 @@ compile() {  # OBJECT SOURCE FLAGS...
   "${compiler[@]}" -std=c++20 -march=armv8-a -isystem $googletest/include "$@" -c "$file" -o "$object" &
   jobs+=($!) objects+=("$object")
 }
-for name in core/error core/log io/events/decode_faults io/events/evt2 io/events/evt3 io/events/evt_test sim/world/texture \
-  sim/world/lanes_test; do
+for name in core/error core/log io/events/decode_faults io/events/evt2 io/events/evt3 io/events/evt3_encoder io/events/evt_test \
+  sim/world/texture sim/world/lanes_test; do
   compile "${name//\//_}" "$source/src/evpose/$name.cpp" -O2 -ffp-contract=off -I"$source/src" -isystem /usr/include/eigen3
 done
 for name in gtest-all gtest_main; do

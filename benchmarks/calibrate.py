@@ -15,9 +15,9 @@ LONG_SCENARIO, LONG_S, LONG_SEED = "turning_2", 10, 230
 LONG_SIZES = {"640x480": "vga", "1280x720": "720p"}
 HEAD = ["recording", "focal %", "centre px", "image px rms", "rotation deg", "place mm", "time ms", "NEES", "largest error, sigma",
         "at rest"]
-TURN_DEG, TURN_S, TURN_SEED = (0, 60, -40, 30), 3, 301
+TURN_DEG, TURN_S, TURN_SEED = (0, 60, -40, 60, -40, 30), 5, 301
 STAR = "data/real/davis240c_rotating_star"
-DRAWN_SCENARIO, DRAWN_S = "turning_2", 4
+DRAWN_SCENARIO, DRAWN_S = "turning_2", 5
 DRAWN_SEEDS = [seed for seed in range(202, 224) if seed not in (204, 208)]  # these, 200 and 201 were looked at
 DRAWN_ROWS = {"focal_percent": "focal %", "centre_px": "centre px", "image_px": "image px rms", "rotation_deg": "rotation deg",
               "place_mm": "place mm", "time_ms": "time ms", "nees": "NEES", "worst_sigma": "largest error, sigma",

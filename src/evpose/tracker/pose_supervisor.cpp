@@ -79,7 +79,9 @@ void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   const double confirming_s = accepted || !verifying() ? span_s : 0;
   confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + confirming_s : 0;
   contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
-  if (verdict == PoseVerdict::confirmed) contradicted_s_ = 0;
+  // Some of the contours that are built of a cloud are where nothing is.
+  const bool given_agrees = map_may_be_wrong_ && !verifying() && verdict == PoseVerdict::contested;
+  if (verdict == PoseVerdict::confirmed || given_agrees) contradicted_s_ = 0;
   if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
   verified_ |= confirmed_s_ > (verifying() ? kFoundConfirmed_s : kConfirmed_s);
 }

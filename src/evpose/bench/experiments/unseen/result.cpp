@@ -30,6 +30,7 @@ void visit_figures(auto& run, Visit&& visit) {
   visit("nees6", run.nees6);
   visit("nees_by_direction", run.nees_by_direction);
   visit("tracking", run.tracking);
+  visit("ate_tracking_mm", run.ate_tracking_mm);
   visit("poses", run.poses);
   visit("silent", run.silent);
   visit("at_end", run.at_end);

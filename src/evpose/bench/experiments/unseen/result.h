@@ -25,9 +25,10 @@ struct RunFigures {
   double nees6 = 0;  ///< mean of NEES / 6
   /// Likewise in the position's and the rotation's axes (body), and in the least known direction of each.
   std::array<double, 8> nees_by_direction{};
-  double tracking = 0;        ///< share of the poses
-  int poses = 0, silent = 0;  ///< silent: called `tracking` and beyond 5 sigma
-  std::string at_end;         ///< health
+  double tracking = 0;         ///< share of the poses
+  double ate_tracking_mm = 0;  ///< of those called `tracking`; 0: none is
+  int poses = 0, silent = 0;   ///< silent: called `tracking` and beyond 5 sigma
+  std::string at_end;          ///< health
 };
 
 /// What became of a seed.

@@ -116,7 +116,7 @@ Distribution distribution(std::vector<double> values) {
 
 Summary summarise(const std::vector<SeedResult>& results, Given given) {
   Summary out;
-  std::vector<double> ate_mm, are_deg, nees6;
+  std::vector<double> ate_mm, ate_tracking_mm, are_deg, nees6;
   double tracking = 0;
   int tracked = 0;
   out.least_tracking = 1;
@@ -133,6 +133,7 @@ Summary summarise(const std::vector<SeedResult>& results, Given given) {
       continue;
     }
     ate_mm.push_back(r.ate_mm);
+    if (r.tracking > 0) ate_tracking_mm.push_back(r.ate_tracking_mm);
     are_deg.push_back(r.are_deg);
     nees6.push_back(r.nees6);
     out.honest += r.nees6 >= kHonestLow && r.nees6 <= kHonestHigh ? 1 : 0;
@@ -147,6 +148,7 @@ Summary summarise(const std::vector<SeedResult>& results, Given given) {
   if (tracked == 0) out.least_tracking = 0;
   out.tracking = tracking / std::max(1, tracked);
   out.ate_mm = distribution(std::move(ate_mm));
+  out.ate_tracking_mm = distribution(std::move(ate_tracking_mm));
   out.are_deg = distribution(std::move(are_deg));
   out.nees6 = distribution(std::move(nees6));
   return out;
@@ -160,6 +162,8 @@ std::string summary_table(const std::vector<SeedResult>& results) {
   };
   return heads("mean / median / p90 / worst") +
          row("ATE mm", all, [](const Summary& s) { return spread(s.ate_mm, "%.2f"); }) +
+         row("ATE mm of poses called `tracking`, seeds that have some", all,
+             [](const Summary& s) { return spread(s.ate_tracking_mm, "%.2f"); }) +
          row("ARE deg", all, [](const Summary& s) { return spread(s.are_deg, "%.3f"); }) +
          row("NEES/6", all, [](const Summary& s) { return spread(s.nees6, "%.2f"); }) +
          row("seeds with NEES/6 in 0.5 .. 2", all, share) +

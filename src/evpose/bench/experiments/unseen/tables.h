@@ -20,6 +20,7 @@ Distribution distribution(std::vector<double> values);
 struct Summary {
   int seeds = 0, without_figures = 0;
   Distribution ate_mm, are_deg, nees6;
+  Distribution ate_tracking_mm;               ///< of the poses called `tracking`, seeds that have some
   double tracking = 0, least_tracking = 0;    ///< share of the poses: mean over the seeds, and least
   int honest = 0;                             ///< seeds with NEES/6 within 0.5 .. 2
   std::array<double, 8> nees_by_direction{};  ///< means over the seeds, as RunFigures

@@ -4,9 +4,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "evpose/bench/experiments/streams.h"
 #include "evpose/eval/score.h"
+#include "evpose/eval/statistics.h"
 #include "evpose/report/overlay.h"
 #include "evpose/report/series.h"
 
@@ -119,8 +121,13 @@ Judgement judge(const std::vector<TrackedPose>& poses, const std::vector<TimedPo
   if (const auto& d = score.nees_by_direction)
     out.nees_by_direction = {d->position.x(), d->position.y(), d->position.z(),     d->rotation.x(),
                              d->rotation.y(), d->rotation.z(), d->weakest_position, d->weakest_rotation};
-  for (const ErrorSample& s : score.samples)
-    if (stood_by[s.index].health == Health::tracking && is_far(s, stood_by[s.index].covariance)) ++out.silent;
+  std::vector<double> tracking_mm;
+  for (const ErrorSample& s : score.samples) {
+    if (stood_by[s.index].health != Health::tracking) continue;
+    tracking_mm.push_back(s.ate_mm());
+    out.silent += is_far(s, stood_by[s.index].covariance) ? 1 : 0;
+  }
+  out.ate_tracking_mm = evpose::summarise(std::move(tracking_mm)).mean;
   out.at_end = to_string(poses.back().health);
   judged.course = course_of(score.samples, stood_by, truth.front().t);
   return judged;

@@ -203,10 +203,13 @@ TEST(UnseenJudgement, ASilentWrongPoseIsFarAndCalledTracking) {
 TEST(UnseenJudgement, CountsWhatIsCalledTracking) {
   const std::vector<TimedPose> truth = straight_truth();
   std::vector<TrackedPose> poses = wrong_poses(truth, 1, Health::tracking);
-  for (std::size_t i = 51; i < 101; ++i) poses[i].health = Health::lost;
+  for (std::size_t i = 21; i < 101; ++i) poses[i].health = i < 51 ? Health::degraded : Health::lost;
+  for (std::size_t i = 21; i < 51; ++i) poses[i].pose.pose.p.z() = 0.1;
   const Judgement judged = judge(poses, truth, 0);
-  EXPECT_NEAR(judged.figures.tracking, 51.0 / 101, 1e-12);
+  EXPECT_NEAR(judged.figures.tracking, 21.0 / 101, 1e-12);
+  EXPECT_NEAR(judged.figures.ate_tracking_mm, 1, 1e-9);
   EXPECT_EQ(judged.figures.at_end, "lost");
+  EXPECT_EQ(judge(wrong_poses(truth, 1, Health::degraded), truth, 0).figures.ate_tracking_mm, 0);
 }
 
 TEST(UnseenJudgement, ErrorsAreThoseOfPosesThatItStandsBy) {
@@ -242,6 +245,7 @@ SeedResult result_of(int seed, double ate_mm, double nees6 = 1) {
     run.are_deg = 0.1 * ate_mm;
     run.nees6 = nees6;
     run.tracking = 1;
+    run.ate_tracking_mm = ate_mm;
     run.poses = 100;
     run.at_end = "tracking";
   }
@@ -263,6 +267,7 @@ TEST(UnseenTables, ASummaryCountsSeedsAndPoses) {
                                   result_of(3, 4, 2.1), result_of(4, 99)};
   results[1].runs[0].silent = 7;
   results[2].runs[0].tracking = 0.5;
+  results[3].runs[0].tracking = 0;
   results[4].runs[0] = {};
   results[4].runs[0].fault = "lost";
   results[4].runs[0].poses = 100;
@@ -275,7 +280,8 @@ TEST(UnseenTables, ASummaryCountsSeedsAndPoses) {
   EXPECT_EQ(s.poses, 400);
   EXPECT_EQ(s.silent_poses, 7);
   EXPECT_EQ(s.silent_seeds, 1);
-  EXPECT_EQ(s.tracking, 0.7);
+  EXPECT_EQ(s.ate_tracking_mm.mean, 2);
+  EXPECT_EQ(s.tracking, 0.5);
   EXPECT_EQ(s.least_tracking, 0);
 }
 

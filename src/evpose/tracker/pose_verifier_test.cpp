@@ -43,7 +43,8 @@ class PoseVerifierLaws : public ::testing::Test {
       project_contours(view, points, {pose_at(t_s).plus(off), test_flight::velocity_at(t_s), rate}, kUpdate_s,
                        samples);
       std::erase_if(samples, [](const ContourSample& s) { return !camera_->size().contains(s.pixel); });
-      auto events = silent ? std::vector<FilteredEvent>{} : between(t_s - kUpdate_s, t_s);
+      auto events = silent ? std::vector<FilteredEvent>{}
+                           : test_flight::filtered_between(events_, t_s - kUpdate_s, t_s);
       if (flickers) events = with_flicker(std::move(events), t_s);
       verifier.add(events, samples, kUpdate_s, kLook_s);
     }
@@ -51,19 +52,6 @@ class PoseVerifierLaws : public ::testing::Test {
   }
 
  private:
-  static std::vector<FilteredEvent> between(double from_s, double to_s) {
-    std::vector<FilteredEvent> out;
-    for (const test_flight::TimedEvent& e : events_) {
-      if (e.t_s < from_s || e.t_s >= to_s) continue;
-      FilteredEvent f{};
-      f.x = e.event.x;
-      f.y = e.event.y;
-      f.on = e.event.on;
-      f.stamp_us = static_cast<std::uint32_t>(1e6 * e.t_s);
-      out.push_back(f);
-    }
-    return out;
-  }
   /// Lamps brighten and darken 100 times a second: in two thirds of the time a tenth of the pixels have an
   /// event each millisecond.
   static std::vector<FilteredEvent> with_flicker(std::vector<FilteredEvent> events, double t_s) {

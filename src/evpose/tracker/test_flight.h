@@ -13,6 +13,7 @@
 
 #include "evpose/camera/camera.h"
 #include "evpose/event/event.h"
+#include "evpose/event/event_preprocessor.h"
 #include "evpose/imu/imu.h"
 #include "evpose/imu/strapdown.h"
 #include "evpose/map/contour_map.h"
@@ -149,6 +150,22 @@ class EdgeEvents {
   const Camera& camera_;
   std::vector<std::optional<Eigen::Vector2d>> before_;
 };
+
+/// Those from a time on and before another one, in their order, with the flight's time as stamps.
+inline std::vector<FilteredEvent> filtered_between(std::span<const TimedEvent> events, double from_s,
+                                                   double to_s) {
+  std::vector<FilteredEvent> out;
+  for (const TimedEvent& e : events) {
+    if (e.t_s < from_s || e.t_s >= to_s) continue;
+    FilteredEvent f{};
+    f.x = e.event.x;
+    f.y = e.event.y;
+    f.on = e.event.on;
+    f.stamp_us = static_cast<std::uint32_t>(1e6 * e.t_s);
+    out.push_back(f);
+  }
+  return out;
+}
 
 /// A packet of events in order of time that begins at base_s. The times of the events, in whole microseconds,
 /// do not depend on it.

@@ -25,9 +25,7 @@ class PoseSupervisorLaws : public ::testing::Test {
   static void SetUpTestSuite() {
     camera_ = test_flight::make_flight_camera();
     world_ = test_flight::boxes();
-    test_flight::EdgeEvents edges(world_, *camera_);
-    for (int i = 0; i * test_flight::EdgeEvents::kStep_s < kFlight_s; ++i)
-      edges.advance(i * test_flight::EdgeEvents::kStep_s, false, events_);
+    events_ = test_flight::record(world_, *camera_, kFlight_s);
   }
 
   PoseSupervisorLaws()

@@ -38,10 +38,7 @@ ContourMap sticks() {
 }
 
 std::vector<test_flight::TimedEvent> record(const ContourMap& world, const Camera& camera) {
-  test_flight::EdgeEvents edges(world, camera);
-  std::vector<test_flight::TimedEvent> out;
-  for (int i = 0; i * test_flight::EdgeEvents::kStep_s < kFlight_s; ++i)
-    edges.advance(i * test_flight::EdgeEvents::kStep_s, false, out);
+  std::vector<test_flight::TimedEvent> out = test_flight::record(world, camera, kFlight_s);
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.t_s < b.t_s; });
   return out;
 }

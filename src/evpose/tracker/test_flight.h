@@ -151,6 +151,14 @@ class EdgeEvents {
   std::vector<std::optional<Eigen::Vector2d>> before_;
 };
 
+/// All events of a flight of so long.
+inline std::vector<TimedEvent> record(const ContourMap& world, const Camera& camera, double flight_s) {
+  EdgeEvents edges(world, camera);
+  std::vector<TimedEvent> out;
+  for (int i = 0; i * EdgeEvents::kStep_s < flight_s; ++i) edges.advance(i * EdgeEvents::kStep_s, false, out);
+  return out;
+}
+
 /// Those from a time on and before another one, in their order, with the flight's time as stamps.
 inline std::vector<FilteredEvent> filtered_between(std::span<const TimedEvent> events, double from_s,
                                                    double to_s) {

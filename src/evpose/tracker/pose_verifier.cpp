@@ -37,6 +37,8 @@ constexpr double kDirectionRatio = 1.7, kDirectionShare = 0.05;  // one of the t
 constexpr double kDirectionRatioUnhidden = 1.4;
 constexpr double kFewestPiecesOfOne = 15, kFewestEventsOfOne = 60;  // of a direction that counts
 constexpr double kRefutedRatio = 1.7, kRefutedShare = 0.1;
+// Of many pieces, when hardly one has clearly more events than beside it: a few long contours make the ratio.
+constexpr double kManyToRefute = 300, kRefutedRatioOfMany = 2.5, kRefutedShareOfMany = 0.015;
 
 /// Which of `count` equal sectors of the half circle the line lies in that has this normal.
 std::uint8_t sector_of(const Eigen::Vector2d& normal, std::size_t count) {
@@ -223,7 +225,10 @@ PoseVerdict PoseVerifier::judge() const {
       e.ratio > kEnoughRatio || (e.ratio > kRatioOfMany && explained > kManyPieces) ||
       (e.ratio > kRatioOfShare && e.explained > kConfirmedShare && explained > kFewestExplained);
   if (agrees) return e.contested ? PoseVerdict::contested : PoseVerdict::confirmed;
-  return e.ratio < kRefutedRatio && e.explained < kRefutedShare ? PoseVerdict::refuted : PoseVerdict::open;
+  const bool refuted =
+      (e.ratio < kRefutedRatio && e.explained < kRefutedShare) ||
+      (e.pieces > kManyToRefute && e.ratio < kRefutedRatioOfMany && e.explained < kRefutedShareOfMany);
+  return refuted ? PoseVerdict::refuted : PoseVerdict::open;
 }
 
 PoseVerdict PoseVerifier::verdict_of_found() const {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <random>
@@ -141,6 +142,40 @@ TEST(PoseVerifierOfFewContours, ConfirmAPoseThatWasGivenButNotOneThatWasFound) {
     EXPECT_EQ(verifier.verdict_of_found(), with_events < 10 ? PoseVerdict::open : PoseVerdict::confirmed)
         << with_events;
   }
+}
+
+/// As after a jump: as many events beside the contours as on them, but for four contours, which make the
+/// ratio.
+TEST(PoseVerifierOfManyContours, RefuteAPoseThatHardlyOneOfThemConfirms) {
+  constexpr int kColumns = 40;
+  constexpr std::array<int, 4> kAside_px{-12, -7, 7, 12};
+  const auto verdict_of = [&](int pieces, int explained) {
+    std::vector<ContourSample> contours(static_cast<std::size_t>(pieces));
+    for (int i = 0; i < pieces; ++i) {
+      contours[i].pixel = {60 + 29 * (i % kColumns), 60 + 29 * (i / kColumns)};
+      contours[i].normal_px = Eigen::Vector2d::UnitX();
+      contours[i].speed_px_s = 300;
+      contours[i].segment = static_cast<std::uint32_t>(i);
+    }
+    PoseVerifier verifier({1280, 720}, static_cast<std::uint32_t>(pieces), true);
+    for (int k = 0; k * kLook_s < kFlight_s; ++k) {
+      std::vector<FilteredEvent> events;
+      const auto add = [&](const ContourSample& contour, int aside_px, int count) {
+        FilteredEvent e{};
+        e.x = static_cast<std::uint16_t>(contour.pixel.x() + aside_px);
+        e.y = static_cast<unsigned>(contour.pixel.y() + 2) & 0x7FFFU;
+        events.insert(events.end(), static_cast<std::size_t>(count), e);
+      };
+      for (int i = 0; i < pieces; ++i) add(contours[i], kAside_px[k % 4], 1);
+      for (int i = 0; i < explained; ++i) add(contours[i], 0, pieces / 2 / explained);
+      verifier.add(events, contours, kUpdate_s, kLook_s);
+    }
+    EXPECT_NEAR(verifier.evidence().ratio, 2, 0.1);
+    return verifier.verdict();
+  };
+  EXPECT_EQ(verdict_of(600, 4), PoseVerdict::refuted);
+  EXPECT_EQ(verdict_of(200, 4), PoseVerdict::open);
+  EXPECT_EQ(verdict_of(600, 30), PoseVerdict::open);
 }
 
 TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {

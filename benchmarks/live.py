@@ -24,7 +24,6 @@ LISTEN_S = 9
 RUNS = [("room_spiral", 3.35, 0, False), ("room_spiral", 3.35, 0, True), ("room_hover", 2.6, 0, False),
         ("courtyard_landing", 4.0, 0, False), ("room_720p", 1.0, 0, False), ("room_spiral", 3.35, 8.5, False),
         ("room_spiral", 3.35, 38.5, False)]
-SEARCHED = f"{100 * live_starts.OFF_M:.0f} cm, {live_starts.OFF_DEG} deg off, said"
 # It is the truth. Were it not known, the first view would be aligned first, in the tracker's thread.
 KNOWN_CALIBRATION = "fusion.calibration.on=false"
 SOAK_MINUTES = 30
@@ -99,7 +98,7 @@ def found(pattern, text, program):
 
 def measure_delay(bench, name, seconds, noise_mev_s, searched):
     recording = bench.peer(name)
-    start = live_starts.starts(recording, 1)[SEARCHED] if searched else ()
+    start = live_starts.starts(recording, 1)[live_starts.OFF_SAID] if searched else ()
     with bench.folder() as scratch:
         printed, heard = Served(bench, recording, LISTEN_S, scratch / "run", f"replay.add_noise_mev_s={noise_mev_s}",
                                 KNOWN_CALIBRATION, start=start).finish()
@@ -111,7 +110,8 @@ def measure_delay(bench, name, seconds, noise_mev_s, searched):
     tracking = re.search(r"tracking ([\d.]+) %", printed)
     missed = found(r"(\d+) missed", heard, "mavlink check")[1]
     sent = f"{delay[1]} / {delay[2]}" if delay else f"{by_serve[1]} / {by_serve[2]}, no pose sent"
-    return [name + (" and noise" if noise_mev_s else "") + (f", start {SEARCHED}" if searched else ""), f"{arrived / seconds / 1e6:.1f}", sent,
+    words = name + (" and noise" if noise_mev_s else "") + (f", start {live_starts.OFF_SAID}" if searched else "")
+    return [words, f"{arrived / seconds / 1e6:.1f}", sent,
             f"{updates} of {round(RATE_HZ * seconds)}", missed, f"{100 * shed / arrived:.1f} %",
             f"{float(looked_at):.0f} %", f"{tracking[1] if tracking else 0} %"]
 

@@ -12,6 +12,7 @@ import tables
 FLIGHTS = {"hall": ("indoor_spiral", 10), "landing": ("landing", 10)}
 KNOWN = "fusion.calibration.on=false"
 OFF_M, OFF_DEG, GPS_M = 0.15, 3, 3
+OFF_SAID = f"{OFF_M * 100:.0f} cm, {OFF_DEG} deg off, said"
 HEAD = ["recording", "start", "first `tracking` after, s", "of all data, `tracking` %", "its error, mean mm", "largest mm",
         "searches, found"]
 
@@ -40,7 +41,7 @@ def starts(recording, seed):
     by_gps = pose_words(position + np.array([drawn.gauss(0, GPS_M) for _ in range(3)]), quaternion, t_s)
     exact = pose_words(position, quaternion, t_s)
     return {"known": ["--init", exact, "--set", KNOWN],
-            f"{OFF_M * 100:.0f} cm, {OFF_DEG} deg off, said": ["--init", off, "--init-sigma", "0.1,2", "--set", KNOWN],
+            OFF_SAID: ["--init", off, "--init-sigma", "0.1,2", "--set", KNOWN],
             f"{OFF_M * 100:.0f} cm, {OFF_DEG} deg off, not said": ["--init", off, "--set", KNOWN],
             f"{GPS_M} m off, heading known, said": ["--init", by_gps, "--init-sigma", f"{GPS_M},20", "--set", KNOWN],
             "anywhere": ["--init", "anywhere", "--set", KNOWN],

@@ -80,7 +80,8 @@ void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + confirming_s : 0;
   contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
   // Some of the contours that are built of a cloud are where nothing is.
-  const bool given_agrees = map_may_be_wrong_ && !verifying() && verdict == PoseVerdict::contested;
+  const bool given_agrees =
+      map_may_be_wrong_ && !verified_ && !verifying() && verdict == PoseVerdict::contested;
   if (verdict == PoseVerdict::confirmed || given_agrees) contradicted_s_ = 0;
   if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
   verified_ |= confirmed_s_ > (verifying() ? kFoundConfirmed_s : kConfirmed_s);

@@ -59,7 +59,7 @@ class PoseSupervisorLaws : public ::testing::Test {
     for (const double until_s = t_s_ + duration_s; t_s_ < until_s; t_s_ += kUpdate_s, ++updates_) {
       if (updates_ % kLookEvery == 0 && !supervisor.searching()) look(supervisor, view, points, off);
       std::string reason;
-      supervisor.judge(
+      health_ = supervisor.judge(
           {kStart_ns + from_seconds(t_s_), kUpdate_s, registration, "", "", {*camera_, view.T_body_cam, 3}},
           *fusion_, &reason);
     }
@@ -86,6 +86,7 @@ class PoseSupervisorLaws : public ::testing::Test {
   std::unique_ptr<BackEnd> fusion_;
   ContourMap wrong_in_one_direction_;
   double t_s_ = 0;
+  Health health_ = Health::waiting;  ///< at the last update
   int updates_ = 0;
 };
 
@@ -124,6 +125,20 @@ TEST_F(PoseSupervisorLaws, OneThatEventsAgreeWithButForOneDirectionIsNotContradi
   EXPECT_FALSE(supervisor.initialised());
   fly(supervisor, 0.6, world_, far_off());
   EXPECT_TRUE(supervisor.searching());
+}
+
+/// Unlike one that was never verified, which is not called tracking meanwhile.
+TEST_F(PoseSupervisorLaws, OneThatWasVerifiedStaysContradictedWhileOneDirectionDisagrees) {
+  PoseSupervisor supervisor = given_pose(true);
+  fly(supervisor, 0.1, world_);
+  EXPECT_EQ(health_, Health::tracking);
+  fly(supervisor, 0.4, world_, far_off());
+  EXPECT_EQ(health_, Health::degraded);
+  // Looks of a while later agree in all directions that are seen.
+  for (int i = 0; i < 50; ++i) {
+    fly(supervisor, kUpdate_s, wrong_in_one_direction_);
+    EXPECT_EQ(health_, Health::degraded) << i;
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "evpose/core/config.h"
 
@@ -24,8 +25,19 @@ constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a 
 // neighbours support each other in the noise filter.
 constexpr float kInterestMargin_px = 2.5F;
 
-constexpr double kGateRim = 0.8;          // events beyond this share of the gate tell the density at it
 constexpr std::uint32_t kProbeEvery = 4;  // calls after which a sample's owned area is probed again
+constexpr int kDirections = 4;
+
+/// Of the image, whose events of one direction share an error: a cluster.
+struct Cells {
+  explicit Cells(ImageSize size)
+      : edge_px(BlockThinning::block_px(size)),
+        columns(size.width / edge_px + 1),
+        rows(size.height / edge_px + 1) {}
+  std::size_t clusters() const { return static_cast<std::size_t>(columns * rows * kDirections); }
+
+  int edge_px, columns, rows;
+};
 
 }  // namespace
 
@@ -55,7 +67,9 @@ EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConf
       config_(config),
       index_(size, kHalfLength_px, kAmbiguity_px),
       contrast_(segments, config.contrast_threshold, config.trail_filter),
-      trust_(config.judge_contours ? segments : 0) {}
+      trust_(config.judge_contours ? segments : 0),
+      sums_(config.contrast_band_px, config.polarity),
+      clusters_(Cells(size).clusters()) {}
 
 bool EventRegistration::polarity_is_wrong(const ContourSample& s, int sign) const {
   const double steps = s.normal_side * contrast_.steps(s.segment);
@@ -69,7 +83,8 @@ struct Speeds {
   double across_px_s, flow_px_s;
 };
 Speeds possible_speeds(const ContourSample& s) {
-  return {std::hypot(s.speed_px_s, s.speed_sigma_px_s), std::hypot(s.flow_px_s, s.speed_sigma_px_s)};
+  const double unsure = s.speed_sigma_px_s * s.speed_sigma_px_s;
+  return {std::sqrt(s.speed_px_s * s.speed_px_s + unsure), std::sqrt(s.flow_px_s * s.flow_px_s + unsure)};
 }
 
 /// Share of the contour's among the events in its gate whose polarity is not excluded.
@@ -92,30 +107,29 @@ double EventRegistration::gate_of(const ContourSample& s) const {
 }
 
 /// Gate, edge delay, weight and excluded polarities of one sample.
-EventRegistration::Line EventRegistration::line_of(const ContourSample& s, double pose_variance) const {
+EventRule EventRegistration::rule_of(const ContourSample& s, double pose_variance) const {
   const double gate = gate_of(s);
   const double variance =
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
   const double share = contour_share(s);
   const double odds = share / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - share);
   const int forward = s.speed_px_s > 0 ? 1 : -1;
-  const auto [delay, delay_sigma_px] = edge_delay(s);
+  const EdgeDelay delay = edge_delay(s).delay;
   return {static_cast<float>(forward * delay.on_px),
           static_cast<float>(forward * delay.off_px),
-          static_cast<float>(delay_sigma_px),
           static_cast<float>(gate),
           static_cast<float>(-0.5 / variance),
           static_cast<float>(odds),
           static_cast<std::int8_t>(polarity_is_wrong(s, forward)),
           static_cast<std::int8_t>(polarity_is_wrong(s, -forward)),
-          static_cast<std::int8_t>(forward),
-          0,
-          0};
+          static_cast<std::int8_t>(forward)};
 }
 
 /// What pixels the samples answer for.
-void EventRegistration::build_bands(std::span<const ContourSample> samples, double span_s,
-                                    const BlockThinning& thinning) {
+void EventRegistration::begin(std::span<const ContourSample> samples, double span_s,
+                              const BlockThinning& thinning, const Matrix6d& pose_covariance) {
+  samples_ = samples;
+  pose_covariance_ = pose_covariance;
   bands_.resize(samples.size());
   asked_.assign(samples.size(), 1);
   all_asked_ = thinning.takes_all();
@@ -135,19 +149,28 @@ void EventRegistration::build_bands(std::span<const ContourSample> samples, doub
   index_.build(bands_, static_cast<float>(1e6 * span_s));
   found_.clear();
   looked_at_ = 0;
+  sums_.begin(samples.size());
+  members_.resize(samples.size());
 }
 
 bool EventRegistration::expect(const RegistrationForecast& forecast, InterestMap* interest) {
-  build_bands(forecast.samples, forecast.span_s, forecast.thinning);
+  begin(forecast.samples, forecast.span_s, forecast.thinning, forecast.pose_covariance);
   index_.mark(asked_, kInterestMargin_px, static_cast<float>(forecast.aside_px), interest);
   return true;
 }
 
+/// Of each event that a band owns, what it says is summed up at once.
 void EventRegistration::look_at(std::span<const FilteredEvent> events, std::uint32_t now_us) {
   const std::size_t before = found_.size();
   index_.find_all(events, looked_at_, now_us, &found_);
   looked_at_ = events.size();
   if (!all_asked_) forget_unasked(before);
+  for (std::size_t k = before; k < found_.size(); ++k) {
+    const auto& [number, owner] = found_[k];
+    const auto sample = static_cast<std::size_t>(owner.band);
+    if (!sums_.has_rule(sample)) make_rule(sample);
+    sums_.add(owner, static_cast<float>(now_us - events[number].stamp_us), events[number].on != 0);
+  }
 }
 
 /// Of the events found from number `first` on, those of contours whose other events were not looked at: they
@@ -160,75 +183,62 @@ void EventRegistration::forget_unasked(std::size_t first) {
                found_.end());
 }
 
-/// By what rules the bands judge their events, for those that have any.
-void EventRegistration::make_lines(const RegistrationProblem& p) {
-  lines_.assign(p.samples.size(), {});
-  const ForecastError error = p.forecast.value_or(ForecastError{});
+/// Of a sample that has got its first event.
+void EventRegistration::make_rule(std::size_t sample) {
+  const ContourSample& s = samples_[sample];
+  const Vector6d& J = s.jacobian;
+  sums_.set_rule(sample, rule_of(s, std::max(0.0, J.dot(pose_covariance_ * J))));
+  const double share = contour_share(s), clutter = config_.polarity_tells_clutter ? (1 - share) / share : 0;
+  const double delay_sigma_px = edge_delay(s).sigma_px;
+  members_[sample] = {cluster_of(s), s.map_sigma_px * s.map_sigma_px, delay_sigma_px * delay_sigma_px,
+                      clutter * clutter};
+}
+
+/// The samples stand where the prediction has them, not where the forecast had them.
+void EventRegistration::shift_sums(const RegistrationProblem& p) {
+  if (p.forecast)
+    for (const std::uint32_t i : sums_.ruled()) {
+      const Vector6d& J = p.samples[i].jacobian;
+      sums_.set_shift(i, {static_cast<float>(J.dot(p.forecast->pose)),
+                          static_cast<float>(-1e-6 * J.head<3>().dot(p.forecast->velocity))});
+    }
+  if (sums_.follow(static_cast<float>(1e6 * p.span_s))) return;
+  sums_.forget_events();
   for (const auto& [k, owner] : found_) {
-    const auto i = static_cast<std::size_t>(owner.band);
-    if (lines_[i].gate > 0) continue;
-    const ContourSample& s = p.samples[i];
-    lines_[i] = line_of(s, std::max(0.0, s.jacobian.dot(p.pose_covariance * s.jacobian)));
-    lines_[i].shift = static_cast<float>(s.jacobian.dot(error.pose));
-    lines_[i].drift = static_cast<float>(-1e-6 * s.jacobian.head<3>().dot(error.velocity));
+    const FilteredEvent& e = p.events[k];
+    sums_.add_shifted(owner, static_cast<float>(p.now_us - e.stamp_us), e.on != 0);
   }
 }
 
-/// An event in the gate that is used.
-void EventRegistration::add_event(std::int32_t band, float d, Sum* sum) {
-  const Line& line = lines_[static_cast<std::size_t>(band)];
-  const float odds = line.odds * std::exp(line.exponent * d * d), w = odds / (1 + odds);
-  sum->weight += w;
-  sum->offset += w * d;
-  sum->square += w * d * d;
-  ++sum->events;
-  GateSums gate{w, w + 2 * w * (1 - w) * d * d * line.exponent, 0};
-  if (std::abs(d) > kGateRim * line.gate) gate.at_gate = w * std::abs(d) / ((1 - kGateRim) * line.gate);
-  sum->gate += gate;
-  concentration_.add(gate);
+EventVerdict EventRegistration::verdict(const EventRule& rule, float distance, bool on) const {
+  if (std::abs(distance) > rule.gate) return EventVerdict::beside;
+  if (config_.polarity && rule.excludes(on)) return EventVerdict::wrong_polarity;
+  return rule.wrong_on || rule.wrong_off ? EventVerdict::predicted : EventVerdict::contour;
 }
 
-void EventRegistration::sum_events(const RegistrationProblem& p, RegistrationResult* result) {
-  sums_.assign(p.samples.size(), {});
-  concentration_.decay(p.span_s);
-  const auto contrast_band_px = static_cast<float>(config_.contrast_band_px);
+/// At each event, for what is asked of it beside the sums.
+void EventRegistration::look_again(const RegistrationProblem& p) {
   if (p.verdicts) p.verdicts->assign(p.events.size(), EventVerdict::elsewhere);
-  if (p.verdicts) owners_.assign(p.events.size(), -1);
   for (const auto& [k, owner] : found_) {
     const FilteredEvent& e = p.events[k];
-    const auto set_verdict = [&, k = k, band = owner.band](EventVerdict v) {
-      if (p.verdicts) (*p.verdicts)[k] = v, owners_[k] = band;
-    };
-    const Line& line = lines_[static_cast<std::size_t>(owner.band)];
-    Sum& sum = sums_[static_cast<std::size_t>(owner.band)];
-    const float d = owner.distance + line.shift + line.drift * static_cast<float>(p.now_us - e.stamp_us) +
-                    (e.on ? line.delay_on : line.delay_off);
-    if (std::abs(d) <= contrast_band_px) sum.net += e.on ? line.forward : -line.forward;
-    set_verdict(EventVerdict::beside);
-    if (std::abs(d) > line.gate) continue;
-    sum.gate_net += e.on ? line.forward : -line.forward;
-    ++sum.gate_all;
-    if (config_.polarity && (e.on ? line.wrong_on : line.wrong_off)) {
-      set_verdict(EventVerdict::wrong_polarity);
-      ++result->wrong_polarity;
-      continue;
-    }
-    if (config_.ego_motion_test) {
-      const AssociationBand& band = bands_[static_cast<std::size_t>(owner.band)];
-      const FlowMonitor::Answer answer = flow_.compare(*p.surface, e, band.nx, band.ny, 1e6F * band.speed);
-      sum.agree += answer == FlowMonitor::Answer::agrees;
-      sum.differ += answer == FlowMonitor::Answer::differs;
-    }
-    set_verdict(line.wrong_on || line.wrong_off ? EventVerdict::predicted : EventVerdict::contour);
-    add_event(owner.band, d, &sum);
+    const auto sample = static_cast<std::size_t>(owner.band);
+    const float d = sums_.distance(owner, static_cast<float>(p.now_us - e.stamp_us), e.on != 0);
+    const EventVerdict v = verdict(sums_.rule(sample), d, e.on != 0);
+    if (p.verdicts) (*p.verdicts)[k] = v;
+    if (!config_.ego_motion_test || (v != EventVerdict::contour && v != EventVerdict::predicted)) continue;
+    const AssociationBand& band = bands_[sample];
+    const FlowMonitor::Answer answer = flow_.compare(*p.surface, e, band.nx, band.ny, 1e6F * band.speed);
+    Cluster& cluster = clusters_[members_[sample].cluster];
+    cluster.agree += answer == FlowMonitor::Answer::agrees;
+    cluster.differ += answer == FlowMonitor::Answer::differs;
   }
 }
 
 /// What the events say of the contours one by one.
 void EventRegistration::judge_contours(const RegistrationProblem& p) {
   trust_.advance(p.span_s);
-  for (std::size_t i = 0; i < p.samples.size(); ++i)
-    if (sums_[i].events > 0) trust_.add(p.samples[i].segment, sums_[i].gate);
+  for (const std::uint32_t i : sums_.ruled())
+    if (sums_.sum(i).events > 0) trust_.add(p.samples[i].segment, sums_.sum(i).gate());
 }
 
 /// Whether the sample's band owns one probe position in it, a different one at every call.
@@ -251,59 +261,55 @@ bool EventRegistration::owns_probe(std::size_t sample, float half_span_us) const
 
 /// Tells the contrast memory what area each segment has swept, owned length times way, and what events fell
 /// there.
-void EventRegistration::learn_contrast(const RegistrationProblem& p) {
+void EventRegistration::learn(std::span<const ContourSample> samples, double span_s) {
+  if (!std::exchange(learns_, false)) return;
   ++call_;
-  const auto half_span_us = static_cast<float>(0.5e6 * p.span_s);
-  const double swept_s = kProbeEvery * p.span_s;
-  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+  const auto half_span_us = static_cast<float>(0.5e6 * span_s);
+  const double swept_s = kProbeEvery * span_s;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
     if (asked_[i] == 0) continue;
-    const ContourSample& s = p.samples[i];
+    const ContourSample& s = samples[i];
     // Probes tell on average what share of its area a band owns; a part of the bands is probed in each call.
     if ((i + call_) % kProbeEvery == 0 && owns_probe(i, half_span_us))
       contrast_.sweep(s.segment, 2 * kHalfLength_px * std::abs(s.speed_px_s) * swept_s);
+    const EventSum& sum = sums_.sum(i);
     const Speeds speeds = possible_speeds(s);
-    contrast_.count_in_gate(s.segment, s.normal_side * sums_[i].gate_net, sums_[i].gate_all,
-                            speeds.across_px_s * p.span_s, speeds.flow_px_s * p.span_s);
-    if (sums_[i].net != 0) contrast_.count(s.segment, s.normal_side * sums_[i].net);
+    contrast_.count_in_gate(s.segment, s.normal_side * sum.gate_net, sum.gate_all,
+                            speeds.across_px_s * span_s, speeds.flow_px_s * span_s);
+    if (sum.net != 0) contrast_.count(s.segment, s.normal_side * sum.net);
   }
 }
 
 /// Cell and 45 deg bin of the contour's direction.
 std::uint32_t EventRegistration::cluster_of(const ContourSample& s) const {
-  const int cell = BlockThinning::block_px(size_);  // whose events share an error
-  const int columns = size_.width / cell + 1, rows = size_.height / cell + 1;
-  const int cx = std::clamp(static_cast<int>(s.pixel.x()) / cell, 0, columns - 1);
-  const int cy = std::clamp(static_cast<int>(s.pixel.y()) / cell, 0, rows - 1);
+  const Cells cells(size_);
+  const int cx = std::clamp(static_cast<int>(s.pixel.x()) / cells.edge_px, 0, cells.columns - 1);
+  const int cy = std::clamp(static_cast<int>(s.pixel.y()) / cells.edge_px, 0, cells.rows - 1);
   const Eigen::Vector2d n = s.normal_px.y() < 0 ? Eigen::Vector2d(-s.normal_px) : s.normal_px;
   const int bin = n.x() >= 0 ? (n.y() < n.x() ? 0 : 1) : (n.y() > -n.x() ? 2 : 3);
-  return static_cast<std::uint32_t>((cy * columns + cx) * 4 + bin);
-}
-
-void EventRegistration::number_clusters(const RegistrationProblem& p) {
-  cluster_numbers_.resize(p.samples.size());
-  for (std::size_t i = 0; i < p.samples.size(); ++i)
-    if (sums_[i].events > 0) cluster_numbers_[i] = cluster_of(p.samples[i]);
+  return static_cast<std::uint32_t>((cy * cells.columns + cx) * kDirections + bin);
 }
 
 /// Finds the clusters that hold events which do not move as the ego-motion says (EV-Pose 5.3).
 void EventRegistration::test_ego_motion(const RegistrationProblem& p) {
   flow_.advance(p.span_s);
-  for (std::size_t i = 0; i < p.samples.size(); ++i)
-    if (sums_[i].events > 0) flow_.add(cluster_numbers_[i], sums_[i].agree, sums_[i].differ);
+  for (std::uint32_t number = 0; number < clusters_.size(); ++number) {
+    Cluster& c = clusters_[number];
+    if (c.weight == 0) continue;
+    flow_.add(number, c.agree, c.differ);
+    c.trust = flow_.trust(number);
+  }
 }
 
-void EventRegistration::sum_clusters(const RegistrationProblem& p) {
-  for (std::size_t i = 0; i < p.samples.size(); ++i) {
-    if (sums_[i].events == 0) continue;
-    const std::uint32_t number = cluster_numbers_[i];
-    if (number >= clusters_.size()) clusters_.resize(number + 1);
-    Cluster& c = clusters_[number];
-    if (c.weight == 0 && config_.ego_motion_test) c.trust = flow_.trust(number);
-    c.weight += sums_[i].weight;
-    const double share = contour_share(p.samples[i]), clutter = (1 - share) / share;
-    if (config_.polarity_tells_clutter) c.clutter += sums_[i].weight * clutter * clutter;
-    c.map_variance += sums_[i].weight * p.samples[i].map_sigma_px * p.samples[i].map_sigma_px;
-    c.delay_variance += sums_[i].weight * lines_[i].delay_sigma * lines_[i].delay_sigma;
+void EventRegistration::sum_clusters() {
+  for (const std::uint32_t i : sums_.ruled()) {
+    const Membership& m = members_[i];
+    const double weight = sums_.sum(i).weight;
+    Cluster& c = clusters_[m.cluster];
+    c.weight += weight;
+    c.clutter += weight * m.clutter;
+    c.map_variance += weight * m.map_variance;
+    c.delay_variance += weight * m.delay_variance;
   }
 }
 
@@ -318,14 +324,14 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
   const double gathered = corrected ? concentration_.share_of_information() : 1;
   double weight = 0, square = 0;
   offsets_.clear();
-  for (std::size_t i = 0; i < p.samples.size(); ++i) {
-    const Sum& sum = sums_[i];
+  for (const std::uint32_t i : sums_.ruled()) {
+    const EventSum& sum = sums_.sum(i);
     if (sum.events == 0) continue;
     ++result->inliers;
     result->events += sum.events;
     weight += sum.weight;
     square += sum.square;
-    const Cluster& c = clusters_[cluster_numbers_[i]];
+    const Cluster& c = clusters_[members_[i].cluster];
     const double own = event_variance / c.weight;
     // Texture beside a contour moves along with it and draws the mean of its events.
     const double by_clutter = 1 + c.clutter / c.weight;
@@ -336,43 +342,44 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
     const double scale = gathered * borne_out * c.trust * own / (own + shared) / event_variance;
     if (c.trust < 0.5) result->other_motion += sum.events;
     const Vector6d& J = p.samples[i].jacobian;
-    result->information.selfadjointView<Eigen::Lower>().rankUpdate(J, scale * correction * sum.weight);
+    result->information.noalias() += (scale * correction * sum.weight) * J * J.transpose();
     result->vector -= scale * sum.offset * J;
     if (sum.weight > 0)
       offsets_.push_back({i, -sum.offset / (correction * sum.weight), scale * correction * sum.weight});
   }
-  result->information.triangularView<Eigen::StrictlyUpper>() = result->information.transpose();
-  result->residual = weight > 0 ? std::sqrt(square / weight) : 0;
+  result->residual = weight > 0 ? std::sqrt(std::max(0.0, square) / weight) : 0;
 }
 
 void EventRegistration::mark_other_motion(const RegistrationProblem& p) {
-  for (std::size_t k = 0; k < p.events.size(); ++k) {
+  for (const auto& [k, owner] : found_) {
     EventVerdict& verdict = (*p.verdicts)[k];
     if (verdict != EventVerdict::contour && verdict != EventVerdict::predicted) continue;
-    const auto sample = static_cast<std::size_t>(owners_[k]);
-    if (clusters_[cluster_numbers_[sample]].trust < 0.5) verdict = EventVerdict::other_motion;
+    if (clusters_[members_[static_cast<std::size_t>(owner.band)].cluster].trust < 0.5)
+      verdict = EventVerdict::other_motion;
   }
 }
 
 RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   EVPOSE_CHECK(!config_.ego_motion_test || p.surface != nullptr);
   RegistrationResult result;
-  if (!p.forecast) build_bands(p.samples, p.span_s, p.thinning);
+  if (!p.forecast) begin(p.samples, p.span_s, p.thinning, p.pose_covariance);
   look_at(p.events, p.now_us);
-  make_lines(p);
-  sum_events(p, &result);
-  learn_contrast(p);
+  shift_sums(p);
+  concentration_.decay(p.span_s);
+  for (const std::uint32_t i : sums_.ruled()) concentration_.add(sums_.sum(i).gate());
   if (config_.judge_contours) judge_contours(p);
-  number_clusters(p);
+  sum_clusters();
+  if (p.verdicts || config_.ego_motion_test) look_again(p);
   if (config_.ego_motion_test) test_ego_motion(p);
-  sum_clusters(p);
   sum_information(p, &result);
   if (p.verdicts) mark_other_motion(p);
-  for (std::size_t i = 0; i < p.samples.size(); ++i)
-    if (sums_[i].events > 0) clusters_[cluster_numbers_[i]] = {};
+  for (const std::uint32_t i : sums_.ruled()) clusters_[members_[i].cluster] = {};
+  result.wrong_polarity = sums_.wrong_polarity();
   result.points = static_cast<int>(p.samples.size());
   result.gate_concentration = concentration_.known() ? concentration_.value() : 0;
   result.consistent = concentration_.consistent();
+  learns_ = true;
+  if (!p.forecast) learn(p.samples, p.span_s);
   return result;
 }
 

@@ -13,6 +13,7 @@
 #include "evpose/registration/association_band.h"
 #include "evpose/registration/contour_trust.h"
 #include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/event_sums.h"
 #include "evpose/registration/flow_monitor.h"
 #include "evpose/registration/gate_concentration.h"
 #include "evpose/registration/registration.h"
@@ -59,6 +60,7 @@ class EventRegistration final : public Registration {
   RegistrationResult measure(const RegistrationProblem& problem) override;
   bool expect(const RegistrationForecast& forecast, InterestMap* interest) override;
   void look_at(std::span<const FilteredEvent> events, std::uint32_t now_us) override;
+  void learn(std::span<const ContourSample> samples, double span_s) override;
   void restart() override { concentration_ = {}; }
   bool reads_surface() const override { return config_.ego_motion_test; }
   std::span<const SampleOffset> offsets() const override { return offsets_; }
@@ -73,39 +75,29 @@ class EventRegistration final : public Registration {
   FilteredEdgeDelay::Value edge_delay(const ContourSample& sample) const;
 
  private:
-  /// What an event needs to know of the sample that it belongs to.
-  struct Line {
-    float delay_on, delay_off;        ///< px, along the normal
-    float delay_sigma;                ///< px
-    float gate;                       ///< px
-    float exponent, odds;             ///< exp(exponent d^2) * odds: of the contour against clutter
-    std::int8_t wrong_on, wrong_off;  ///< polarity excluded
-    std::int8_t forward;              ///< +1 if the contour moves along its normal, else -1
-    float shift, drift;               ///< the forecast's error: distance px, and per us of age
-  };
-  struct Sum {
-    double weight = 0, offset = 0, square = 0;
-    GateSums gate;
-    int events = 0, net = 0;         ///< net: events near by, for the contrast
-    int gate_net = 0, gate_all = 0;  ///< likewise in the gate, of both polarities; all
-    int agree = 0, differ = 0;       ///< events in the gate that move as predicted, or not
+  /// What a sample that has events brings to its cluster: of cell and direction.
+  struct Membership {
+    std::uint32_t cluster;
+    double map_variance, delay_variance;  ///< px^2
+    double clutter;                       ///< squared ratio of clutter to the contour's own
   };
   struct Cluster {
     double weight = 0, map_variance = 0, delay_variance = 0, clutter = 0, trust = 1;
+    int agree = 0, differ = 0;  ///< events in the gates that move as predicted, or not
   };
   double gate_of(const ContourSample& sample) const;
   double contour_share(const ContourSample& sample) const;
-  void build_bands(std::span<const ContourSample> samples, double span_s, const BlockThinning& thinning);
+  void begin(std::span<const ContourSample> samples, double span_s, const BlockThinning& thinning,
+             const Matrix6d& pose_covariance);
   void forget_unasked(std::size_t first);
-  void make_lines(const RegistrationProblem& problem);
-  Line line_of(const ContourSample& sample, double pose_variance) const;
-  void sum_events(const RegistrationProblem& problem, RegistrationResult* result);
-  void add_event(std::int32_t band, float distance, Sum* sum);
-  void learn_contrast(const RegistrationProblem& problem);
+  void make_rule(std::size_t sample);
+  EventRule rule_of(const ContourSample& sample, double pose_variance) const;
+  void shift_sums(const RegistrationProblem& problem);
+  void look_again(const RegistrationProblem& problem);
+  EventVerdict verdict(const EventRule& rule, float distance, bool on) const;
   void judge_contours(const RegistrationProblem& problem);
-  void number_clusters(const RegistrationProblem& problem);
   void test_ego_motion(const RegistrationProblem& problem);
-  void sum_clusters(const RegistrationProblem& problem);
+  void sum_clusters();
   void sum_information(const RegistrationProblem& problem, RegistrationResult* result);
   void mark_other_motion(const RegistrationProblem& problem);
   std::uint32_t cluster_of(const ContourSample& sample) const;
@@ -119,19 +111,20 @@ class EventRegistration final : public Registration {
   FlowMonitor flow_;
   ContourTrust trust_;
   GateConcentration concentration_;
-  // Of the last call, one for each sample; kept so that steady state allocates nothing.
+  // Of the interval, one for each sample; kept so that steady state allocates nothing.
+  std::span<const ContourSample> samples_;  ///< from begin() to measure()
+  Matrix6d pose_covariance_;                ///< that rules are made for
   std::vector<AssociationBand> bands_;
   std::vector<std::uint8_t> asked_;  ///< 1: events on the sample's block are looked at
   bool all_asked_ = true;
-  std::vector<Line> lines_;  ///< of bands that own events
   std::vector<AssociationIndex::Found> found_;
-  std::size_t looked_at_ = 0;  ///< events, since expect()
-  std::vector<Sum> sums_;
+  std::size_t looked_at_ = 0;  ///< events, since begin()
+  EventSums sums_;
+  std::vector<Membership> members_;  ///< of the samples with rules
   std::vector<SampleOffset> offsets_;
   std::vector<Cluster> clusters_;
-  std::vector<std::uint32_t> cluster_numbers_;
-  std::vector<std::int32_t> owners_;  ///< of the events, if verdicts are asked for
   std::uint32_t call_ = 0;
+  bool learns_ = false;  ///< what was measured last is still to be learnt from
 };
 
 }  // namespace evpose

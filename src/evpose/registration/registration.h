@@ -38,6 +38,7 @@ struct RegistrationForecast {
   double span_s;                           ///< until then
   BlockThinning thinning = {};             ///< where events will be looked at
   double aside_px = 0;                     ///< so far beside the contours they matter, too
+  Matrix6d pose_covariance = Matrix6d::Zero();
 };
 
 /// By how much the prediction differs from the forecast that its samples were made for.
@@ -100,6 +101,10 @@ class Registration {
   virtual bool expect(const RegistrationForecast&, InterestMap*) { return false; }
   /// All events since expect(), those of the last call among them; `now_us`: time of the measurement.
   virtual void look_at(std::span<const FilteredEvent>, std::uint32_t /*now_us*/) {}
+
+  /// What the last measurement teaches of the contours, for later ones: the pose need not wait for it. To be
+  /// called after each with a forecast, with its samples and span.
+  virtual void learn(std::span<const ContourSample>, double /*span_s*/) {}
 
   /// The pose comes from elsewhere: how well events met the contours until now does not count any more.
   virtual void restart() {}

@@ -57,7 +57,7 @@ void TextureLandmarks::prepare(TimeNs next_update, EventPreprocessor& events) {
 void TextureLandmarks::expect(const FusionState& coming, double span_s, const Pose& found_at) {
   if (landmarks_.empty()) return;
   project(coming, span_s, found_at);
-  expected_ = registration_->expect({samples_, span_s}, &near_);
+  expected_ = registration_->expect({samples_, span_s, {}, 0, coming.pose_covariance()}, &near_);
 }
 
 void TextureLandmarks::look_at(std::uint32_t now_us) {
@@ -145,7 +145,9 @@ RelativeInformation TextureLandmarks::measure(const Input& input, const BackEnd&
     problem.forecast = {state.nav.T_map_body.minus(input.forecast->T_map_body),
                         state.nav.velocity - input.forecast->velocity};
   RelativeInformation out(adjusted_ == nullptr ? 0 : adjusted_->numbers());
-  if (registration_->measure(problem).inliers < kFewestSeen) return out;
+  const int seen = registration_->measure(problem).inliers;
+  registration_->learn(samples_, input.span_s);
+  if (seen < kFewestSeen) return out;
   for (const SampleOffset& offset : registration_->offsets()) {
     const ContourSample& s = samples_[offset.sample];
     const Landmark& landmark = landmarks_[s.point];

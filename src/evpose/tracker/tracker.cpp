@@ -167,6 +167,7 @@ FusionState Tracker::forecast() const {
 /// Once a pose is out, before the next events come: points, their bands, and where events matter.
 void Tracker::prepare_update() {
   const double began_s = reporter_.now_s();
+  registration_->learn(contours_.samples(), expected_span_s_);
   look_aside();
   choose_blocks();
   forecast_.reset();
@@ -181,7 +182,8 @@ void Tracker::prepare_update() {
     const double span_s = to_seconds(next_update_ - last_update_);
     project_samples(coming, span_s);
     const double aside_px = looks_aside_ ? PoseVerifier::kAside_px : 0;
-    if (registration_->expect({contours_.samples(), span_s, thinning_, aside_px}, &interest_))
+    if (registration_->expect(
+            {contours_.samples(), span_s, thinning_, aside_px, fusion_->measured_covariance()}, &interest_))
       forecast_ = coming.nav;
     if (forecast_) expect_landmarks(coming, span_s);
   }

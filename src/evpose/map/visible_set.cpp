@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kInTime = 0.9;            // of the way to a refresh, the next choice shall be there
 constexpr double kWhileUsed = 0.6;         // of the way to a refresh, the next choice may take
-constexpr float kExamined = 0.4F;          // of the stride, in the image: spacing of the points examined
+constexpr double kNearShare = 0.25;        // of the chosen points may move by more than is reckoned with
+constexpr float kExamined = 0.8F;          // of the stride, in the image: spacing of the points examined
 constexpr std::size_t kSlice = 500;        // points examined in a call, if there is time
 constexpr std::size_t kMostUpdates = 100;  // that a choice may take
 constexpr std::size_t kCellsAPoint = 200;  // filled in the time that a point takes
@@ -91,8 +92,7 @@ void VisibleSet::renumber(std::span<const std::uint32_t> number_now) {
 
 double VisibleSet::moved_px(const Pose& from, const Pose& to) const {
   const Vector6d d = to.minus(from);
-  return (d.tail<3>().norm() + d.head<3>().norm() / std::max(nearest_m_, config_.near_m)) *
-         camera_.focal_px();
+  return (d.tail<3>().norm() + d.head<3>().norm() / std::max(near_m_, config_.near_m)) * camera_.focal_px();
 }
 
 const std::vector<std::uint32_t>& VisibleSet::choose(const Pose& T_map_cam) {
@@ -140,7 +140,7 @@ void VisibleSet::complete_choice() {
   calls_left_ = 0;
   points_.swap(next_points_);
   T_map_cam_ = next_T_map_cam_;
-  nearest_m_ = next_nearest_m_;
+  near_m_ = next_near_m_;
   chosen_once_ = true;
 }
 
@@ -262,6 +262,18 @@ void VisibleSet::keep_if_visible(std::uint32_t number) {
   next_points_.push_back(number);
 }
 
+/// Distance below which a share of the chosen points lie.
+double VisibleSet::near_distance_m() {
+  if (next_points_.empty()) return config_.far_m;
+  distances_m_.clear();
+  for (const std::uint32_t i : next_points_)
+    distances_m_.push_back((index_.map().position(i) - next_T_map_cam_.p).norm());
+  const auto at = distances_m_.begin() +
+                  static_cast<std::ptrdiff_t>(kNearShare * static_cast<double>(distances_m_.size() - 1));
+  std::nth_element(distances_m_.begin(), at, distances_m_.end());
+  return *at;
+}
+
 void VisibleSet::keep_to_budget() {
   finished_ = true;
   if (next_points_.size() > static_cast<std::size_t>(config_.budget)) {
@@ -274,9 +286,7 @@ void VisibleSet::keep_to_budget() {
     next_points_.erase(middle, next_points_.end());
     std::sort(next_points_.begin(), next_points_.end());
   }
-  next_nearest_m_ = config_.far_m;
-  for (const std::uint32_t i : next_points_)
-    next_nearest_m_ = std::min(next_nearest_m_, (index_.map().position(i) - next_T_map_cam_.p).norm());
+  next_near_m_ = near_distance_m();
 }
 
 }  // namespace evpose

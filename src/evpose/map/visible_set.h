@@ -67,6 +67,7 @@ class VisibleSet {
   std::uint32_t end_of_examined(const ContourIndex::Cube& cube) const;
   void keep_if_visible(std::uint32_t number);
   void keep_to_budget();
+  double near_distance_m();
   bool outside_cone(const Eigen::Vector3f& centre_cam, float radius) const;
   bool has_chosen_neighbour(const Eigen::Vector2f& u, const Eigen::Vector2f& t) const;
   std::size_t cell_of(const Eigen::Vector2f& pixel) const;
@@ -77,15 +78,16 @@ class VisibleSet {
   bool background_;
   float cone_cos_, cone_sin_;  ///< of the cone around the optical axis that holds the image
   std::vector<std::uint32_t> points_;
-  Pose T_map_cam_;        ///< of points_
-  double nearest_m_ = 0;  ///< depth of the nearest of points_
+  Pose T_map_cam_;     ///< of points_
+  double near_m_ = 0;  ///< distance of the nearer ones of points_
   bool chosen_once_ = false;
   std::optional<Pose> last_;  ///< of the last call
 
   // The choice under way.
   int calls_left_ = 0;  ///< until it is taken, 0: none is under way
   Pose next_T_map_cam_;
-  double next_nearest_m_ = 0;
+  double next_near_m_ = 0;
+  std::vector<double> distances_m_;
   bool finished_ = false;
   Eigen::Matrix3f R_cam_map_;
   Eigen::Vector3f offset_;  ///< of the map's anchor, camera frame

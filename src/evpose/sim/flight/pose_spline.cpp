@@ -49,8 +49,8 @@ void AngularMotion::rotate(const Eigen::Vector3d& axis, double angle, double ang
   angular_acceleration = back * angular_acceleration + rate.cross(angle_1 * axis) + angle_2 * axis;
 }
 
-PoseSpline::PoseSpline(double knot_s, std::vector<Pose> control)
-    : knot_s_(knot_s), control_(std::move(control)) {
+PoseSpline::PoseSpline(double knot_s, std::vector<Pose> control, double first_s)
+    : knot_s_(knot_s), first_s_(first_s), control_(std::move(control)) {
   EVPOSE_CHECK(knot_s > 0 && !control_.empty());
   set_steps();
 }
@@ -69,7 +69,8 @@ std::size_t PoseSpline::index(std::ptrdiff_t k) const {
 BodyMotion PoseSpline::at(double t_s) const {
   // Beyond this all control poses are equal.
   const double edge_s = kOrder * knot_s_;
-  const auto [knot, u] = locate(std::clamp(t_s, -edge_s, duration_s() + edge_s), knot_s_);
+  const auto [knot, u] =
+      locate(std::clamp(t_s, first_s_ - edge_s, duration_s() + edge_s) - first_s_, knot_s_);
   const Basis b = basis(u);
   const double per_s = 1 / knot_s_;
   BodyMotion m;

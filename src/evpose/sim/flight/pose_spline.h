@@ -25,22 +25,23 @@ struct AngularMotion {
 /// exact.
 class PoseSpline {
  public:
-  /// `control`[k] belongs to time k * knot_s; at least one. Before the first and after the last the ends are
-  /// held, so that the curve comes to rest there within three knots.
-  PoseSpline(double knot_s, std::vector<Pose> control);
+  /// `control`[k] belongs to time first_s + k * knot_s; at least one. Before the first and after the last the
+  /// ends are held, so that the curve comes to rest there within kReach knots.
+  PoseSpline(double knot_s, std::vector<Pose> control, double first_s = 0);
+  static constexpr int kReach = 3;
 
   /// Least squares through poses at increasing times from 0 on. Gaps are bridged smoothly.
   static PoseSpline fit(const std::vector<double>& t_s, const std::vector<Pose>& poses, double knot_s);
 
   BodyMotion at(double t_s) const;
   /// Time of the last control pose.
-  double duration_s() const { return knot_s_ * static_cast<double>(control_.size() - 1); }
+  double duration_s() const { return first_s_ + knot_s_ * static_cast<double>(control_.size() - 1); }
 
  private:
   void set_steps();
   std::size_t index(std::ptrdiff_t k) const;
 
-  double knot_s_;
+  double knot_s_, first_s_;
   std::vector<Pose> control_;
   std::vector<Eigen::Vector3d> steps_;  ///< [k]: rotation vector from control k - 1 to k, the first zero
 };

@@ -293,11 +293,18 @@ PoseSpline plan_spline(const Plan& plan, const TrajectoryConfig& c, const Motion
     turn[k] += bank[k];
     if (plan.sway_factor) turn[k] *= plan.sway_factor(flight_time(kKnot_s * static_cast<double>(k), rest_s));
   }
+  // Before the recording it moves as after it, the other way round: it begins in flight, not with a jerk.
+  constexpr std::size_t kLead = PoseSpline::kReach;
   const auto spline = [&](double fraction) {
-    std::vector<Pose> control(count);
-    for (std::size_t k = 0; k < count; ++k)
-      control[k] = {about_z(yaw[k]) * so3::exp(fraction * turn[k]), position[k]};
-    return PoseSpline(kKnot_s, std::move(control));
+    const auto extended = [](const auto& values, std::size_t k) {
+      using Value = std::decay_t<decltype(values[0])>;
+      return k >= kLead ? values[k - kLead] : Value(2 * values[0] - values[kLead - k]);
+    };
+    std::vector<Pose> control(kLead + count);
+    for (std::size_t k = 0; k < control.size(); ++k)
+      control[k] = {about_z(extended(yaw, k)) * so3::exp(fraction * extended(turn, k)),
+                    extended(position, k)};
+    return PoseSpline(kKnot_s, std::move(control), -kKnot_s * static_cast<double>(kLead));
   };
   // Scales slow rotation and bank to the largest size whose peak rate stays below the limit.
   const auto peak_rate = [&](double fraction) {

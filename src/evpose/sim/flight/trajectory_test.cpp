@@ -96,6 +96,30 @@ TEST(Trajectory, SplineRestsBeyondItsEnds) {
   }
 }
 
+/// A recording that does not begin at rest begins in the middle of a flight.
+TEST(Trajectory, BeginsInFlightAsItGoesOn) {
+  for (const auto kind : {TrajectoryKind::aggressive, TrajectoryKind::square_spiral, TrajectoryKind::sweep,
+                          TrajectoryKind::hover, TrajectoryKind::traverse}) {
+    TrajectoryConfig c;
+    c.kind = kind;
+    c.vibration_mm = c.vibration_deg = 0;
+    c.duration_s = 4;
+    const auto trajectory = make_trajectory(c);
+    ASSERT_TRUE(trajectory);
+    const auto most_from = [&](double from_s, double to_s) {
+      Eigen::Vector2d most = Eigen::Vector2d::Zero();
+      for (double t = from_s; t < to_s; t += 1e-3) {
+        const BodyMotion m = trajectory->at(t);
+        most = most.cwiseMax(Eigen::Vector2d(m.acceleration.norm(), m.angular_acceleration.norm()));
+      }
+      return most;
+    };
+    const Eigen::Vector2d first = most_from(0, 0.05), later = most_from(0.05, 3.9);
+    EXPECT_LE(first.x(), 1.5 * later.x() + 1e-9) << static_cast<int>(kind);
+    EXPECT_LE(first.y(), 1.5 * later.y() + 1e-9) << static_cast<int>(kind);
+  }
+}
+
 TEST(PoseSpline, FitGivesASplineBackFromItsPoses) {
   Random random(9);
   std::vector<Pose> control(40);

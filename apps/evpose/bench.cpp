@@ -199,6 +199,11 @@ void add_realtime(CLI::App& bench, Run& run) {
                     "decode beside tracking, and clock by the wall; else processor time of one core");
   command->add_option("--burst", request->burst_mev_s, "million random events a second more, for 50 ms")
       ->check(CLI::NonNegativeNumber);
+  command->add_flag("--beside-batch", request->beside_batch,
+                    "each once more with events that are associated at the update, not as they come");
+  command->add_option("--runs", request->runs, "of each; medians are told")
+      ->check(CLI::Range(1, 99))
+      ->capture_default_str();
   command->callback([=, &run] { run = [=] { return exit_status(experiments::print_realtime(*request)); }; });
 }
 

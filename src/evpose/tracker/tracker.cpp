@@ -182,7 +182,8 @@ void Tracker::prepare_update() {
     const double span_s = to_seconds(next_update_ - last_update_);
     project_samples(coming, span_s);
     const double aside_px = looks_aside_ ? PoseVerifier::kAside_px : 0;
-    if (registration_->expect(
+    if (config_.streams &&
+        registration_->expect(
             {contours_.samples(), span_s, thinning_, aside_px, fusion_->measured_covariance()}, &interest_))
       forecast_ = coming.nav;
     if (forecast_) expect_landmarks(coming, span_s);

@@ -28,6 +28,9 @@ struct TrackerConfig {
   ImuWatchConfig imu;
   RelocalizationConfig relocalization;
   HealthConfig health;
+
+  // Not for users: the twin that benchmarks and tests compare with.
+  bool streams = true;  ///< false: events are associated at the update, not as they come
 };
 void describe(ConfigTable& table, TrackerConfig& config);
 

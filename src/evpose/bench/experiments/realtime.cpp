@@ -34,11 +34,15 @@ double rate_of(const std::vector<EventPacket>& packets) {
   return 1e-6 * static_cast<double>(events) / to_seconds(kPacket * static_cast<TimeNs>(packets.size()));
 }
 
+/// Of one run.
 struct Figures {
   double events = 0, busy_s = 0, data_s = 0, shed = 0;
   std::vector<double> delay_ms;
   TrajectoryScore score;
   Health at_end = Health::waiting;
+
+  double sustained_mev_s() const { return 1e-6 * events / busy_s; }
+  double share_of_core() const { return busy_s / data_s; }
 };
 
 /// A camera's driver: the recording's packets with random events added, as words of EVT3.
@@ -146,14 +150,46 @@ class Run {
   std::vector<Matrix6d> covariances_;
 };
 
-void print_row(const std::string& name, ImageSize size, double rate_mev_s, double updates_hz, Figures f) {
-  std::sort(f.delay_ms.begin(), f.delay_ms.end());
-  std::printf("| %s | %dx%d | %.0f | %.0f | %s | %.2f | %.1f | %.0f %% | %.2f / %.2f / %.2f | %.1f %% |\n",
-              name.c_str(), size.width, size.height, rate_mev_s, updates_hz, to_string(f.at_end),
-              f.score.ate_mm.mean, 1e-6 * f.events / f.busy_s, 100 * f.busy_s / f.data_s,
-              quantile(f.delay_ms, 0.5), quantile(f.delay_ms, 0.99), f.delay_ms.back(),
-              100 * f.shed / std::max(1.0, f.events));
+/// Over the runs, of what `figure` takes of each.
+template <class Figure>
+double median(const std::vector<Figures>& runs, const Figure& figure) {
+  std::vector<double> values;
+  for (const Figures& f : runs) values.push_back(figure(f));
+  std::sort(values.begin(), values.end());
+  return quantile(values, 0.5);
+}
+
+/// All runs give the same poses.
+void print_row(const std::string& name, ImageSize size, double rate_mev_s, double updates_hz, bool streams,
+               const std::vector<Figures>& runs) {
+  const auto delay_ms = [&](double share) {
+    return median(runs, [&](const Figures& f) { return quantile(f.delay_ms, share); });
+  };
+  std::printf(
+      "| %s | %dx%d | %.0f | %.0f | %s | %s | %.2f | %.1f | %.0f %% | %.2f / %.2f / %.2f | %.1f %% |\n",
+      name.c_str(), size.width, size.height, rate_mev_s, updates_hz,
+      streams ? "as they come" : "at the update", to_string(runs.front().at_end),
+      runs.front().score.ate_mm.mean, median(runs, [](const Figures& f) { return f.sustained_mev_s(); }),
+      100 * median(runs, [](const Figures& f) { return f.share_of_core(); }), delay_ms(0.5), delay_ms(0.99),
+      delay_ms(1), 100 * runs.front().shed / std::max(1.0, runs.front().events));
   std::fflush(stdout);
+}
+
+Status print_rate(const Streams& streams, const std::string& name, const RealtimeRequest& request,
+                  TrackerConfig config, double rate_mev_s) {
+  for (const bool streaming : request.beside_batch ? std::vector{true, false} : std::vector{true}) {
+    config.streams = streaming;
+    std::vector<Figures> runs;
+    for (int i = 0; i < request.runs; ++i) {
+      auto figures = Run(streams, request, rate_mev_s).track(config);
+      if (!figures) return figures.error();
+      std::sort(figures->delay_ms.begin(), figures->delay_ms.end());
+      runs.push_back(std::move(*figures));
+    }
+    print_row(name, streams.job.recording.camera.size, std::max(rate_of(streams.packets), rate_mev_s),
+              config.rate_hz, streaming, runs);
+  }
+  return {};
 }
 
 Status print_recording(const BenchRecording& recording, const RealtimeRequest& request) {
@@ -165,11 +201,8 @@ Status print_recording(const BenchRecording& recording, const RealtimeRequest& r
   for (const double rate_mev_s : request.rates_mev_s)
     for (const double updates_hz : request.updates_hz) {
       config->tracker.rate_hz = updates_hz;
-      const auto figures = Run(*streams, request, rate_mev_s).track(config->tracker);
-      if (!figures) return figures.error();
-      const double own = rate_of(streams->packets);
-      print_row(recording.name, streams->job.recording.camera.size, std::max(own, rate_mev_s), updates_hz,
-                *figures);
+      if (auto ok = print_rate(*streams, recording.name, request, config->tracker, rate_mev_s); !ok)
+        return ok;
     }
   return {};
 }
@@ -180,9 +213,11 @@ Status print_realtime(const RealtimeRequest& request) {
   const auto recordings = select_recordings(request.selection);
   if (!recordings) return recordings.error();
   std::printf(
-      "| recording | image | Mev/s | updates a second | at the end | ATE mm | sustained Mev/s | share of a "
+      "| recording | image | Mev/s | updates a second | associated | at the end | ATE mm | sustained Mev/s | "
+      "share of a "
       "core "
-      "| newest event to pose, ms: p50 / p99 / max | shed |\n|---|---|---|---|---|---|---|---|---|---|\n");
+      "| newest event to pose, ms: p50 / p99 / max | shed "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const BenchRecording& recording : *recordings)
     if (auto ok = print_recording(recording, request); !ok) return ok;
   return {};

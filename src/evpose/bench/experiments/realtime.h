@@ -14,6 +14,8 @@ struct RealtimeRequest {
   std::vector<double> updates_hz = {300, 1000};
   bool two_cores = false;  ///< decoding beside tracking, by the wall clock; else processor time of one thread
   double burst_mev_s = 0;  ///< of random events, for 50 ms in the middle
+  bool beside_batch = false;  ///< and once more with events associated at the update
+  int runs = 1;               ///< of each; the median of every figure is told
 };
 
 /// Tracks recordings in packets of a millisecond, as words of EVT3 and with events at random pixels added

@@ -64,7 +64,7 @@ TEST(NoiseFilter, WindowIsALengthInTheImage) {
 TEST(NoiseFilter, MasksThePixelThatFiresAlone) {
   NoiseFilter filter(32, 32, {});
   std::uint32_t t = 1;
-  for (int i = 0; i < 1000; ++i) {
+  for (int i = 0; i < 1400; ++i) {  // two seconds: a band of rows counts for one, and the first turn is short
     t += 1500;
     filter.keep(20, 20, t);                            // 667 Hz, alone
     if (i % 100 == 0) filter.keep(1 + i / 100, 5, t);  // a slow edge
@@ -74,6 +74,22 @@ TEST(NoiseFilter, MasksThePixelThatFiresAlone) {
   EXPECT_EQ(filter.hot_pixels()[0].y, 20);
   EXPECT_FALSE(filter.keep(20, 20, t + 1));
   EXPECT_FALSE(filter.keep(21, 20, t + 2)) << "a hot pixel supports nobody";
+}
+
+/// One that stops and goes on after a long time is not taken for it; nor are others than the one, wherever.
+TEST(NoiseFilter, MasksPixelsInEveryBandAndNoneThatRested) {
+  NoiseFilter filter(40, 200, {});
+  std::uint32_t t = 1;
+  for (int i = 0; i < 2100; ++i) {
+    t += 1000;
+    for (int y = 3; y < 200; y += 24) filter.keep(20, y, t);
+    filter.keep(i % 15, i % 200, t);  // what else moves
+  }
+  ASSERT_EQ(filter.hot_pixels().size(), 9u);
+  NoiseFilter rested(40, 200, {});
+  t = 1;
+  for (int i = 0; i < 200; ++i) rested.keep(20, 100, t += 500'000);  // two a second
+  EXPECT_TRUE(rested.hot_pixels().empty());
 }
 
 TEST(TimeSurface, KeepsTheLastEventOfEachPolarity) {

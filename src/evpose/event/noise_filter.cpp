@@ -2,6 +2,7 @@
 #include "evpose/event/noise_filter.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "evpose/core/config.h"
 #include "evpose/event/time_surface.h"
@@ -34,34 +35,58 @@ void NoiseFilter::set_motion(double flow_px_per_s) {
   support_us_ = static_cast<std::uint32_t>(std::clamp(s, config_.support_min_s, longest) * 1e6);
 }
 
-void NoiseFilter::end_second(std::uint32_t stamp_us) {
-  if (second_end_us_ != 0) {
-    std::vector<std::uint16_t> active;
-    for (const Cell& c : cells_)
-      if (c.seen > 0 && c.unsupported != kMasked) active.push_back(c.seen);
-    if (!active.empty()) {
-      const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
-      std::nth_element(active.begin(), middle, active.end());
-      const double limit = std::max(kHotLeastPerSecond, kHotFactor * *middle);
-      for (int y = 0; y < height_; ++y)
-        for (int x = 0; x < width_; ++x) {
-          Cell& c = cells_[index(x, y)];
-          if (c.unsupported == kMasked || c.unsupported < limit) continue;
-          c = {0, 0, kMasked};  // its past events support nobody
-          hot_.push_back({x, y});
-        }
+void NoiseFilter::judge_bands(std::uint32_t stamp_us) {
+  constexpr std::uint32_t kTurn_us = 1'000'000 / kBands;
+  if (next_band_us_ == 0) next_band_us_ = stamp_us + kTurn_us;
+  for (int turns = 0; stamp_us >= next_band_us_; ++turns) {
+    if (turns == kBands) {  // no events for longer than a second
+      next_band_us_ = stamp_us + kTurn_us;
+      return;
     }
+    end_second_of(next_band_);
+    next_band_us_ += kTurn_us;
+    if (++next_band_ < kBands) continue;
+    next_band_ = 0;
+    judging_ = true;
+    last_ = std::exchange(now_, {});
   }
-  for (Cell& c : cells_) {
+}
+
+double NoiseFilter::median_of_active() const {
+  std::uint32_t all = 0, below = 0;
+  for (std::size_t seen = 1; seen < now_.size(); ++seen) all += last_[seen] + now_[seen];
+  for (std::size_t seen = 1; seen < now_.size(); ++seen)
+    if ((below += last_[seen] + now_[seen]) > all / 2) return static_cast<double>(seen);
+  return 0;
+}
+
+/// Masks its hot pixels and counts anew.
+void NoiseFilter::end_second_of(int band) {
+  const int first = height_ * band / kBands, end = height_ * (band + 1) / kBands;
+  const auto for_each_cell = [&](const auto& take) {
+    for (int y = first; y < end; ++y)
+      for (int x = 0; x < width_; ++x) take(cells_[index(x, y)], x, y);
+  };
+  if (judging_) {
+    for_each_cell([this](const Cell& c, int, int) {
+      if (c.unsupported != kMasked) ++now_[std::min<std::size_t>(c.seen, now_.size() - 1)];
+    });
+    const double limit = std::max(kHotLeastPerSecond, kHotFactor * median_of_active());
+    for_each_cell([&](Cell& c, int x, int y) {
+      if (c.unsupported == kMasked || c.unsupported < limit) return;
+      c = {0, 0, kMasked};  // its past events support nobody
+      hot_.push_back({x, y});
+    });
+  }
+  for_each_cell([](Cell& c, int, int) {
     c.seen = 0;
     if (c.unsupported != kMasked) c.unsupported = 0;
-  }
-  second_end_us_ = stamp_us + 1'000'000;
+  });
 }
 
 void NoiseFilter::rebase(std::uint32_t shift_us) {
   for (Cell& c : cells_) c.last = c.last > shift_us ? c.last - shift_us : 0;
-  second_end_us_ = second_end_us_ > shift_us ? second_end_us_ - shift_us : 1;
+  next_band_us_ = next_band_us_ > shift_us ? next_band_us_ - shift_us : 1;
 }
 
 }  // namespace evpose

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -29,9 +30,10 @@ class NoiseFilter {
   /// turned into time, so that it means the same at every speed.
   void set_motion(double flow_px_per_s);
 
-  /// True if the event is to be kept. O(1) but for one pass over the pixels a second. Pixel inside the image.
+  /// True if the event is to be kept. O(1), but for a band of rows, of which each is looked through once a
+  /// second. Pixel inside the image.
   bool keep(int x, int y, std::uint32_t stamp_us) {
-    if (stamp_us >= second_end_us_) end_second(stamp_us);
+    if (stamp_us >= next_band_us_) judge_bands(stamp_us);
     Cell& cell = cells_[index(x, y)];
     if (cell.unsupported == kMasked) return false;
     const bool supported = newest_neighbour(&cell) + support_us_ >= stamp_us;
@@ -52,7 +54,7 @@ class NoiseFilter {
   struct Pixel {
     int x, y;
   };
-  /// Masked so far, in row order of the second in which they were found.
+  /// Masked so far, in the order in which they were found.
   const std::vector<Pixel>& hot_pixels() const { return hot_; }
 
   void rebase(std::uint32_t shift_us);
@@ -62,7 +64,7 @@ class NoiseFilter {
   /// Together, so that an event touches three lines of memory and no more.
   struct Cell {
     std::uint32_t last = 0;
-    std::uint16_t seen = 0, unsupported = 0;  ///< events this second; kMasked: of a hot pixel
+    std::uint16_t seen = 0, unsupported = 0;  ///< events this second of its band; kMasked: of a hot pixel
   };
 
   std::size_t index(int x, int y) const {
@@ -78,14 +80,22 @@ class NoiseFilter {
     // "Never" must not support the first moments of the clock.
     return newest == 0 ? 0 - support_us_ : newest;
   }
-  void end_second(std::uint32_t stamp_us);
+  /// Numbers of pixels by the events that they had in a second, active ones.
+  using Histogram = std::array<std::uint32_t, 256>;
+  void judge_bands(std::uint32_t stamp_us);
+  void end_second_of(int band);
+  double median_of_active() const;
 
   NoiseFilterConfig config_;
   int width_, height_;
   std::size_t stride_;
   std::uint32_t support_us_;
-  std::uint32_t second_end_us_ = 0;
-  RandomAccessTable<Cell> cells_;  ///< with a border of one pixel
+  static constexpr int kBands = 64;  ///< each gets its turn in a second, so that no event waits for all
+  int next_band_ = 0;
+  std::uint32_t next_band_us_ = 0;
+  bool judging_ = false;            ///< each band has counted for a second
+  Histogram last_ = {}, now_ = {};  ///< of the last round over the bands, and of this one
+  RandomAccessTable<Cell> cells_;   ///< with a border of one pixel
   std::vector<Pixel> hot_;
 };
 

@@ -25,7 +25,7 @@ constexpr double kLargestDelay_px = 0.5;  // by so much events may come after a 
 // neighbours support each other in the noise filter.
 constexpr float kInterestMargin_px = 2.5F;
 
-constexpr std::uint32_t kProbeEvery = 4;  // calls after which a sample's owned area is probed again
+constexpr std::uint32_t kProbeEvery = 8;  // calls after which a sample's owned area is probed again
 constexpr int kDirections = 4;
 
 /// Of the image, whose events of one direction share an error: a cluster.

@@ -52,6 +52,7 @@ BENCHMARKS = {
     "performance": ("performance", "make", "kernels and decoders by themselves (evpose_microbench)", "10 min"),
     "live": ("live", "make", "delay of evpose serve", "1 min"),
     "live-starts": ("live_starts", "make", "first poses of evpose serve, from starts known well, badly or not at all", "5 min"),
+    "live-flights": ("live_flights", "make", "flights of a wide sensor live beside offline; wants the flights of unseen", "5 min"),
     "soak": ("live", "make_soak", "memory of evpose serve over half an hour", "30 min"),
     "simulator-speed": ("simulator_speed", "make", "processor time of the simulator", "5 min"),
     "simulator-peer": ("simulator_peer", "make", "the simulator beside an independent one; its pictures", "10 min"),

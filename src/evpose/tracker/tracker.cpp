@@ -11,7 +11,7 @@ namespace evpose {
 namespace {
 
 // Contours that the prediction has moved by less since the forecast are moved along, others projected anew.
-constexpr double kForecastHolds_px = 0.5;
+constexpr double kForecastHolds_px = 0.25;
 // So often the events beside the contours count, too.
 constexpr TimeNs kLookAside = 13 * kNsPerMs;
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInTime = 0.9;            // of the way to a refresh, the next choice shall be there
 constexpr double kWhileUsed = 0.6;         // of the way to a refresh, the next choice may take
-constexpr double kNearShare = 0.25;        // of the chosen points may move by more than is reckoned with
+constexpr double kNearShare = 0.15;        // of the chosen points may move by more than is reckoned with
 constexpr float kExamined = 0.4F;          // of the stride, in the image: spacing of the points examined
 constexpr std::size_t kSlice = 500;        // points examined in a call, if there is time
 constexpr std::size_t kMostUpdates = 100;  // that a choice may take

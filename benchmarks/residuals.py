@@ -5,6 +5,7 @@ import math
 import pathlib
 import statistics
 
+import edge_delay
 import tables
 
 UNSEEN = (100, 101, 102, 103, 105, 107)  # the first of halls, courtyards and canyons whose events fit into memory twice
@@ -36,11 +37,13 @@ def with_true_calibration(folder, target):
     return target
 
 
+def prepared(folder, target):
+    return with_true_calibration(folder, target) if (folder / "camchain-imucam_truth.yaml").exists() else folder
+
+
 def measure(bench, recording):
     with bench.folder() as scratch:
-        folder = recording.folder
-        if (folder / "camchain-imucam_truth.yaml").exists():
-            folder = with_true_calibration(folder, pathlib.Path(scratch) / "flight")
+        folder = prepared(recording.folder, pathlib.Path(scratch) / "flight")
         return tables_by_first_column(bench.run("bench", "residuals", folder, "--map", recording.contours, "--occluders",
                                                 recording.mesh, "--set", "fusion.calibration.on=false"))
 
@@ -108,6 +111,7 @@ def make(bench):
     groups["unseen flights"] = all_of(flights[:1] if bench.quick else
                                       [f for f in flights if int(f.folder.name[-4:]) in UNSEEN])
     return bench.write_page("residuals", {
+        **edge_delay.sections(bench, prepared),
         "delay": tables.table([DELAY, "polarity", *groups], delay_rows(groups)),
         "speed": tables.table([SPEED, *groups], speed_rows(groups)),
         "directions": tables.table(["", "direction", "recordings", "offset px, rms", "sigma px, rms", "of it lasts px, rms",

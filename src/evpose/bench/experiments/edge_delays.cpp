@@ -14,41 +14,41 @@ namespace {
 
 constexpr double kCounts = 500;  // events of a class, from which on it counts in the root mean square
 
-struct Measured {
+struct MeasuredDelays {
   std::string name;
   DelaySamples samples;
 };
 
-/// A fit, and for each sample of a recording what it leaves over.
-struct Column {
+/// What a sensor's parameters leave over of each sample; positive: earlier than they say.
+struct Leftover {
   std::string name;
-  SensorDelay sensor;
+  std::vector<double> px;
 };
 
-std::vector<double> left_px(const DelaySamples& samples, const SensorDelay& sensor) {
-  std::vector<double> out = delays_px(samples, sensor);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] -= samples.samples[i].late_px;
+Leftover leftover(const std::string& name, const DelaySamples& samples, const SensorDelay& sensor) {
+  Leftover out{name, delays_px(samples, sensor)};
+  for (std::size_t i = 0; i < out.px.size(); ++i) out.px[i] -= samples.samples[i].late_px;
   return out;
 }
 
-struct Class {
-  std::string what;
+struct DelayClass {
+  std::string name;
   bool on;
   double low, high;
   double (*value)(const DelaySample&);
   bool holds(const DelaySample& s) const { return s.on == on && value(s) >= low && value(s) < high; }
 };
 
-std::vector<Class> classes() {
+std::vector<DelayClass> delay_classes() {
   const std::vector<double> crossings{0, 0.5, 1, 2, 4, 1e9}, speeds{8, 25, 60, 120, 1e9};
-  std::vector<Class> out;
+  std::vector<DelayClass> out;
   const auto add = [&](const std::vector<double>& limits, const char* unit,
                        double (*value)(const DelaySample&)) {
     for (const bool on : {true, false})
       for (std::size_t k = 0; k + 1 < limits.size(); ++k) {
+        const double low = limits[k], high = limits[k + 1];
         const bool last = k + 2 == limits.size();
-        out.push_back({last ? text("> ", limits[k], unit) : text(limits[k], " - ", limits[k + 1], unit), on,
-                       limits[k], limits[k + 1], value});
+        out.push_back({last ? text("> ", low, unit) : text(low, " - ", high, unit), on, low, high, value});
       }
   };
   add(crossings, " events", [](const DelaySample& s) { return s.crossing; });
@@ -61,46 +61,36 @@ struct ClassMean {
   double events = 0, left_px = 0;
 };
 
-ClassMean mean_of(const Class& c, const DelaySamples& samples, const std::vector<double>& left) {
+ClassMean mean_of(const DelayClass& c, const DelaySamples& samples, const Leftover& left) {
   ClassMean out;
-  for (std::size_t i = 0; i < left.size(); ++i) {
+  for (std::size_t i = 0; i < left.px.size(); ++i) {
     const DelaySample& s = samples.samples[i];
     if (!c.holds(s)) continue;
     out.events += s.events;
-    out.left_px += s.events * left[i];
+    out.left_px += s.events * left.px[i];
   }
   out.left_px /= std::max(1.0, out.events);
   return out;
 }
 
-void print_left(const Measured& m, const std::vector<Column>& columns) {
-  std::vector<std::vector<double>> left;
+void print_left(const DelaySamples& samples, const std::vector<Leftover>& columns) {
   std::printf("\n| class | polarity | events |");
-  for (const Column& c : columns) {
-    left.push_back(left_px(m.samples, c.sensor));
-    std::printf(" %s |", c.name.c_str());
-  }
-  std::printf("\n|---|---|---|%s\n",
-              [&] {
-                std::string rule;
-                for (std::size_t k = 0; k < columns.size(); ++k) rule += "---|";
-                return rule;
-              }()
-                  .c_str());
+  for (const Leftover& c : columns) std::printf(" %s |", c.name.c_str());
+  std::printf("\n|---|---|---|");
+  for (std::size_t k = 0; k < columns.size(); ++k) std::printf("---|");
   std::vector<double> square(columns.size(), 0);
   int counted = 0;
-  for (const Class& c : classes()) {
-    const double events = mean_of(c, m.samples, left[0]).events;
-    std::printf("| %s | %s | %.0f |", c.what.c_str(), c.on ? "on" : "off", events);
+  for (const DelayClass& c : delay_classes()) {
+    const double events = mean_of(c, samples, columns[0]).events;
     counted += events >= kCounts;
+    std::printf("\n| %s | %s | %.0f |", c.name.c_str(), c.on ? "on" : "off", events);
     for (std::size_t k = 0; k < columns.size(); ++k) {
-      const double px = mean_of(c, m.samples, left[k]).left_px;
+      const double px = mean_of(c, samples, columns[k]).left_px;
       std::printf(" %.3f |", px);
       if (events >= kCounts) square[k] += px * px;
     }
-    std::printf("\n");
   }
-  std::printf("| root mean square | of %.0f events or more | %d classes |", kCounts, counted);
+  std::printf("\n| root mean square | of %d classes | %.0f or more |", counted, kCounts);
   for (const double s : square) std::printf(" %.3f |", std::sqrt(s / std::max(1, counted)));
   std::printf("\n");
 }
@@ -116,32 +106,34 @@ void print_fits_head() {
   std::printf("\n| fit | looks | threshold | latency on ms | latency off ms |\n|---|---|---|---|---|\n");
 }
 
-std::vector<const DelaySamples*> all_but(const std::vector<Measured>& all, const Measured* left_out) {
+std::vector<const DelaySamples*> all_but(const std::vector<MeasuredDelays>& all,
+                                         const MeasuredDelays* left_out) {
   std::vector<const DelaySamples*> out;
-  for (const Measured& m : all)
+  for (const MeasuredDelays& m : all)
     if (&m != left_out) out.push_back(&m.samples);
   return out;
 }
 
-void print_recording(const Measured& m, const std::vector<Measured>& all) {
+void print_recording(const MeasuredDelays& m, const std::vector<MeasuredDelays>& all) {
   const DelayFit own = fit_delay({&m.samples}, DelayFreedom::all);
   std::printf("\n### %s\n", m.name.c_str());
   print_fits_head();
   print_fit("its own", own);
-  std::vector<Column> columns{{"as it is px", {}}, {"own fit px", own.sensor}};
+  std::vector<Leftover> columns{leftover("as it is px", m.samples, {}),
+                                leftover("own fit px", m.samples, own.sensor)};
   if (all.size() > 1) {
     const DelayFit others = fit_delay(all_but(all, &m), DelayFreedom::all);
     const DelayFit handed = fit_delay(all_but(all, &m), DelayFreedom::handed_on);
     print_fit("of the others", others);
     print_fit("of the others, handed on", handed);
-    columns.push_back({"others' fit px", others.sensor});
-    columns.push_back({"others' fit, handed on px", handed.sensor});
+    columns.push_back(leftover("others' fit px", m.samples, others.sensor));
+    columns.push_back(leftover("others' fit, handed on px", m.samples, handed.sensor));
   }
-  print_left(m, columns);
+  print_left(m.samples, columns);
 }
 
 /// How the program takes what was found.
-void print_hand_on(const std::vector<Measured>& all) {
+void print_hand_on(const std::vector<MeasuredDelays>& all) {
   const DelayFit fit = fit_delay(all_but(all, nullptr), DelayFreedom::handed_on);
   std::printf("\n### all\n");
   print_fits_head();
@@ -171,7 +163,7 @@ Expected<BenchRecording> recording_of(const EdgeDelaysRequest& request, std::siz
   return out;
 }
 
-Expected<Measured> measure(const BenchRecording& recording, const EdgeDelaysRequest& request) {
+Expected<MeasuredDelays> measure(const BenchRecording& recording, const EdgeDelaysRequest& request) {
   const auto config = configure(request.assignments);
   if (!config) return config.error();
   const auto streams = load_streams(recording, *config);
@@ -185,13 +177,13 @@ Expected<Measured> measure(const BenchRecording& recording, const EdgeDelaysRequ
   if (poses.size() < 2)
     return Error{recording.folder, "no poses", "give a recording with ground truth, or --tracked"};
   const auto& filter = streams->job.setup.trail_filter;
-  return Measured{recording.name, delay_samples(looks_from(*streams, poses), filter)};
+  return MeasuredDelays{recording.name, delay_samples(looks_from(*streams, poses), filter)};
 }
 
 }  // namespace
 
 Status print_edge_delays(const EdgeDelaysRequest& request) {
-  std::vector<Measured> all;
+  std::vector<MeasuredDelays> all;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
     const auto recording = recording_of(request, i);
     if (!recording) return recording.error();
@@ -199,7 +191,7 @@ Status print_edge_delays(const EdgeDelaysRequest& request) {
     if (!measured) return measured.error();
     all.push_back(*std::move(measured));
   }
-  for (const Measured& m : all) print_recording(m, all);
+  for (const MeasuredDelays& m : all) print_recording(m, all);
   print_hand_on(all);
   return {};
 }

@@ -14,6 +14,7 @@ FEWEST_LOOKS = 50
 DELAY, SENSE, SPEED, TIME = "events per crossing", "sense", "speed", "time between looks s"
 DIRECTION = "direction across the contour"
 LEFT = "left over px"
+OF_TRACKER = f"tracker's pose: {LEFT}"
 
 
 def tables_by_first_column(markdown):
@@ -89,6 +90,13 @@ def direction_rows(groups):
     return rows
 
 
+def budget_rows(groups):
+    """Of each recording, by direction: the mean offset at the true pose, and what the tracker's pose leaves of it."""
+    return [[name, *(f"{row[LEFT]}, {row[OF_TRACKER]}" for row in one[SENSE]
+                     if row[SENSE].startswith("in the image"))]
+            for found in groups.values() for name, one in found.items()]
+
+
 def recording_rows(groups):
     rows = []
     for found in groups.values():
@@ -116,6 +124,8 @@ def make(bench):
         "speed": tables.table([SPEED, *groups], speed_rows(groups)),
         "directions": tables.table(["", "direction", "recordings", "offset px, rms", "sigma px, rms", "of it lasts px, rms",
                                     "memory s, median"], direction_rows(groups)),
+        "budget": tables.table(["recording", *(f"{angle} deg: true pose, tracker's" for angle in (0, 45, 90, 135))],
+                               budget_rows(groups)),
         "recordings": tables.table(["recording", "looks", "along the motion px", "to the darker side px", "scatter px",
                                     "tracker's pose: along the motion px", "scatter px", "correlation after 0.2 to 0.4 s"],
                                    recording_rows(groups))})

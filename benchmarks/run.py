@@ -40,6 +40,7 @@ BENCHMARKS = {
     "kidnapping": ("experiments", "make_kidnapping", "live sessions whose data stop while the camera moves on", "5 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
+    "real": ("paper_evaluation", "make_real", "real recordings before known contours", "1 min"),
     "light": ("light", "make", "flights in which lamps go off or the light steps", "20 min"),
     "residuals": ("residuals", "make", "events beside the contours of the true pose; wants the flights of unseen", "5 min"),
     "calibration": ("experiments", "make_calibration", "wrong calibrations, estimated online", "45 min"),

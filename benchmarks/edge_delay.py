@@ -3,6 +3,7 @@
 sensor: sections of docs/results/residuals.md."""
 import math
 import pathlib
+import re
 
 import tables
 
@@ -70,8 +71,41 @@ def class_rows(found):
     return [[*which, *(cell(recordings, which) for recordings in found.values())] for which in classes]
 
 
+def latency_ms(fit, name):
+    """That which a fit gives both polarities, by the name of its row; None where there is none."""
+    row = next((r for r in fit if r["fit"] == name), None)
+    return row and sum(float(row[f"latency {which} ms"].split()[0]) for which in ("on", "off")) / 2
+
+
+def tracked(bench, flight, prepare, late_ms):
+    """ATE mm, NEES/6 with true contours and the true calibration, of which so much is taken off the time offset."""
+    with bench.folder() as scratch:
+        folder = prepare(flight.folder, pathlib.Path(scratch) / "flight")
+        path = folder / "camchain-imucam.yaml"
+        text = re.sub(r"(timeshift_cam_imu: )(\S+)", lambda m: f"{m[1]}{float(m[2]) - 1e-3 * late_ms:.7f}", path.read_text())
+        path.unlink()
+        path.write_text(text)
+        summary = bench.track(folder, flight.contours, scratch / "run", "--occluders", flight.mesh, "--init", "groundtruth")
+        later = bench.later_accuracy(scratch / "run", flight.truth)
+    return f"{later['ate_mean_mm']:.2f}, {summary.get('accuracy', {}).get('nees6_mean', float('nan')):.2f}"
+
+
+def latency_rows(bench, found, prepare):
+    flights = {} if bench.quick else {f.folder.name: f for f in bench.unseen_flights()}
+    rows = []
+    for group, recordings in found.items():
+        for name in [name for name in recordings if name in flights]:
+            fit = recordings[name]["fit"]
+            late = [0, latency_ms(fit, "its own"), latency_ms(fit, "of the others, handed on")]
+            rows.append([group, name, *(bench.once(f"edge delay: {name} tracked, {ms} ms",
+                                                   lambda ms=ms: tracked(bench, flights[name], prepare, ms)) for ms in late)])
+    return rows
+
+
 def sections(bench, prepare):
     found = groups(bench, prepare)
-    return {"edge delay": tables.table(["sensor", "recording", "threshold", "latency on ms", "latency off ms", *FITS.values()],
+    return {"latency": tables.table(["sensor", "flight", "as it is", "less its own latency", "less that of the others"],
+                                    latency_rows(bench, found, prepare)),
+            "edge delay": tables.table(["sensor", "recording", "threshold", "latency on ms", "latency off ms", *FITS.values()],
                                        fit_rows(found)),
             "edge delay by class": tables.table(["class", "polarity", *found], class_rows(found))}

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What `evpose bench edge-delay` finds for sensors, and what its parameters leave over on other recordings of the same
 sensor: sections of docs/results/residuals.md."""
+import dataclasses
 import math
 import pathlib
 import re
 
+import light
 import tables
 
 # Flights of development seeds (`evpose bench unseen --from SEED --seeds 1 --keep`) by kind of sensor. Their thresholds are
@@ -37,6 +39,9 @@ def measure(bench, recordings, prepare):
 
 def groups(bench, prepare):
     out = {"shared": bench.peers()}
+    if not bench.quick:  # threshold 0.25
+        out["simulated hall"] = [dataclasses.replace(bench.simulated(f.scenario, f.seconds, f.settings), name=f.name)
+                                 for f in light.flights()]
     flights = {} if bench.quick else {int(f.folder.name[-4:]): f for f in bench.unseen_flights()}
     for name, seeds in FLIGHTS.items():
         there = [flights[seed] for seed in seeds if seed in flights]

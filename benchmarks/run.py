@@ -32,7 +32,7 @@ BENCHMARKS = {
     "paper-long": ("paper_long", "make", "flights of 10 s, three seeds: errors, time by stage, memory", "25 min"),
     "paper-map": ("paper", "make_map", "the paper's map beside ours: errors, and tracking with both", "3 min"),
     "paper-corners": ("paper", "make_corners", "repeatability of corners in events, and of the map's contours", "1 min"),
-    "paper-evaluation": ("paper", "make_evaluation", "its evaluation: distributions, rates, a real chunk", "5 min"),
+    "paper-evaluation": ("paper", "make_evaluation", "its evaluation: distributions, rates", "5 min"),
     "frames": ("frames", "make", "frames alone, events alone and both, on simulated flights", "15 min"),
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),

@@ -103,5 +103,5 @@ def make_corners(bench):
 
 
 def make_evaluation(bench):
-    """docs/results/paper-evaluation.md: distributions, relative errors, rates, a real chunk."""
+    """docs/results/paper-evaluation.md: distributions, relative errors, rates."""
     return bench.write_page("paper-evaluation", paper_evaluation.sections(bench))

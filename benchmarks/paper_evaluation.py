@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """docs/results/paper-evaluation.md: the evaluation of EV-Pose with its form and with the defaults: distributions of the error,
-relative errors, rates of updates, real recordings."""
+relative errors, rates of updates; docs/results/real.md: real recordings."""
 import json
 import pathlib
 import subprocess
@@ -144,5 +144,10 @@ def real_chunk(bench):
 
 def sections(bench):
     peers = bench.peers()
-    return {"distributions": distributions(bench, peers), "relative": relative(bench, peers), "rates": rates(bench, peers),
-            "real chunk": real_chunk(bench), "board": paper_real.boards(bench), "star": paper_real.star(bench)}
+    return {"distributions": distributions(bench, peers), "relative": relative(bench, peers), "rates": rates(bench, peers)}
+
+
+def make_real(bench):
+    """docs/results/real.md."""
+    return bench.write_page("real", {"real chunk": real_chunk(bench), "board": paper_real.boards(bench),
+                                     "star": paper_real.star(bench)})

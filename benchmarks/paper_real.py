@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Real recordings before known contours, in the paper's form and with the defaults: a section of
-docs/results/paper-evaluation.md."""
+"""Real recordings before known contours, in the paper's form and with the defaults: sections of
+docs/results/real.md."""
 import json
 
 import files

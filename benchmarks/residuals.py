@@ -3,14 +3,18 @@
 off: by contrast, polarity and speed, on shared recordings and on flights of reporting seeds."""
 import math
 import pathlib
+import statistics
 
+import edge_delay
 import tables
 
-UNSEEN = 2  # the first of them that were made: one of 1280x720 takes minutes
+UNSEEN = (100, 101, 102, 103, 105, 107)  # the first of halls, courtyards and canyons whose events fit into memory twice
 FEWEST = 500  # events of a class, or looks, below which a recording does not count in a spread
 FEWEST_LOOKS = 50
 DELAY, SENSE, SPEED, TIME = "events per crossing", "sense", "speed", "time between looks s"
+DIRECTION = "direction across the contour"
 LEFT = "left over px"
+OF_TRACKER = f"tracker's pose: {LEFT}"
 
 
 def tables_by_first_column(markdown):
@@ -34,11 +38,13 @@ def with_true_calibration(folder, target):
     return target
 
 
+def prepared(folder, target):
+    return with_true_calibration(folder, target) if (folder / "camchain-imucam_truth.yaml").exists() else folder
+
+
 def measure(bench, recording):
     with bench.folder() as scratch:
-        folder = recording.folder
-        if (folder / "camchain-imucam_truth.yaml").exists():
-            folder = with_true_calibration(folder, pathlib.Path(scratch) / "flight")
+        folder = prepared(recording.folder, pathlib.Path(scratch) / "flight")
         return tables_by_first_column(bench.run("bench", "residuals", folder, "--map", recording.contours, "--occluders",
                                                 recording.mesh, "--set", "fusion.calibration.on=false"))
 
@@ -67,6 +73,30 @@ def speed_rows(groups):
             for c in classes]
 
 
+def direction_rows(groups):
+    """Of each group: root mean square over recordings of offset, sigma and lasting sigma; median memory."""
+    def rms(rows, key):
+        return math.sqrt(sum(float(row[key]) ** 2 for row in rows) / len(rows))
+
+    rows = []
+    for name, found in groups.items():
+        for direction in [row[DIRECTION] for row in next(iter(found.values()))[DIRECTION]]:
+            those = [row for one in found.values() for row in one[DIRECTION]
+                     if row[DIRECTION] == direction and int(row["looks"]) >= FEWEST_LOOKS]
+            if those:
+                rows.append([name, direction, len(those), *(f"{rms(those, key):.3f}" for key in
+                                                            ("offset px", "sigma px", "of it lasts px")),
+                             f"{statistics.median(float(row['memory s']) for row in those):.2f}"])
+    return rows
+
+
+def budget_rows(groups):
+    """Of each recording, by direction: the mean offset at the true pose, and what the tracker's pose leaves of it."""
+    return [[name, *(f"{row[LEFT]}, {row[OF_TRACKER]}" for row in one[SENSE]
+                     if row[SENSE].startswith("in the image"))]
+            for found in groups.values() for name, one in found.items()]
+
+
 def recording_rows(groups):
     rows = []
     for found in groups.values():
@@ -85,10 +115,17 @@ def make(bench):
     groups = {"shared": all_of(bench.peers())}
     if not bench.quick:
         groups["shared, places with clutter"] = all_of(bench.more_peers())
-    groups["unseen flights"] = all_of(bench.unseen_flights()[:1 if bench.quick else UNSEEN])
+    flights = bench.unseen_flights()
+    groups["unseen flights"] = all_of(flights[:1] if bench.quick else
+                                      [f for f in flights if int(f.folder.name[-4:]) in UNSEEN])
     return bench.write_page("residuals", {
+        **edge_delay.sections(bench, prepared),
         "delay": tables.table([DELAY, "polarity", *groups], delay_rows(groups)),
         "speed": tables.table([SPEED, *groups], speed_rows(groups)),
+        "directions": tables.table(["", "direction", "recordings", "offset px, rms", "sigma px, rms", "of it lasts px, rms",
+                                    "memory s, median"], direction_rows(groups)),
+        "budget": tables.table(["recording", *(f"{angle} deg: true pose, tracker's" for angle in (0, 45, 90, 135))],
+                               budget_rows(groups)),
         "recordings": tables.table(["recording", "looks", "along the motion px", "to the darker side px", "scatter px",
                                     "tracker's pose: along the motion px", "scatter px", "correlation after 0.2 to 0.4 s"],
                                    recording_rows(groups))})

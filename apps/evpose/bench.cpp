@@ -8,6 +8,7 @@
 #include "commands.h"
 #include "evpose/bench/experiments/calibration.h"
 #include "evpose/bench/experiments/corner_repeatability.h"
+#include "evpose/bench/experiments/edge_delays.h"
 #include "evpose/bench/experiments/event_origins.h"
 #include "evpose/bench/experiments/faults.h"
 #include "evpose/bench/experiments/kidnapping.h"
@@ -221,6 +222,24 @@ void add_residuals(CLI::App& bench, Run& run) {
   });
 }
 
+void add_edge_delay(CLI::App& bench, Run& run) {
+  auto* command = bench.add_subcommand("edge-delay",
+                                       "A sensor's parameters of how late events come, from its recordings");
+  auto request = std::make_shared<experiments::EdgeDelaysRequest>();
+  command->add_option("recordings", request->recordings, "folders with truth, all of one sensor")->required();
+  command
+      ->add_option(
+          "--map", request->maps,
+          "contour map of all, or one for each; default: contours.ply and mesh.ply beside the events")
+      ->allow_extra_args(false);
+  command->add_option("--occluders", request->occluders, "mesh that hides contours, likewise")
+      ->allow_extra_args(false);
+  command->add_flag("--tracked", request->tracked, "from the poses that the tracker finds, without truth");
+  add_settings(*command, request->assignments);
+  command->callback(
+      [=, &run] { run = [=] { return exit_status(experiments::print_edge_delays(*request)); }; });
+}
+
 void add_picture(CLI::App& bench, Run& run) {
   auto* command = bench.add_subcommand(
       "picture", "Draw one update: its events over the contours, by what became of them");
@@ -290,6 +309,7 @@ void add_bench(CLI::App& app, std::function<int()>& run) {
   add_faults(*bench, run);
   add_realtime(*bench, run);
   add_residuals(*bench, run);
+  add_edge_delay(*bench, run);
   add_picture(*bench, run);
   add_unseen(*bench, run);
 }

@@ -6,91 +6,13 @@
 #include <cstdio>
 #include <functional>
 
+#include "evpose/bench/experiments/posed_looks.h"
 #include "evpose/bench/experiments/residuals_picture.h"
 
 namespace evpose::experiments {
 namespace {
 
 using Looks = std::vector<ContourLook>;
-
-/// The poses that the tracker finds, at the rate of the IMU.
-Expected<std::vector<TimedPose>> tracked_poses(const Streams& streams) {
-  auto tracker = Tracker::create(streams.job.setup, streams.job.config.tracker, streams.job.start);
-  if (!tracker) return tracker.error();
-  std::vector<TimedPose> out;
-  const auto add = [&](TimeNs t, const Pose& pose) {
-    if (out.empty() || t > out.back().t) out.push_back({t, pose});
-  };
-  (*tracker)->on_update([&](const Update& u) { add(u.t, u.T_map_body); });
-  (*tracker)->on_state([&](const FusionState& s) { add(s.t, s.nav.T_map_body); });
-  feed(streams.packets, streams.imu, **tracker);
-  return out;
-}
-
-TrackerConfig with_sensor(TrackerConfig config, const TrackerSetup& setup) {
-  config.event_registration.trail_filter = setup.trail_filter;
-  return config;
-}
-
-/// Holds the events against the contours as seen from given poses, one update after the other.
-class PosedRegistration {
- public:
-  PosedRegistration(const TrackJob& job, const std::vector<TimedPose>& poses)
-      : job_(job),
-        config_(with_sensor(job.config.tracker, job.setup)),
-        poses_(poses),
-        index_(*job.map),
-        segments_(cut_into_segments(*job.map)),
-        contours_(index_, segments_, *job.setup.camera, *job.setup.camera, job.setup.T_body_cam,
-                  config_.visible, config_.event_registration.map_sigma_m, false),
-        preprocessor_(job.setup.camera->size().width, job.setup.camera->size().height, config_.events),
-        registration_(job.setup.camera->size(), config_.event_registration, segments_.count),
-        counter_(job.setup.camera->size(), *job.map) {}
-
-  Looks run(const std::vector<EventPacket>& packets) {
-    constexpr TimeNs kBorder = 6 * kNsPerMs;  // the velocity at a time needs poses around it
-    const TimeNs period = from_seconds(1 / config_.rate_hz);
-    const TimeNs begin = std::max(job_.start.t, poses_.front().t + kBorder), end = poses_.back().t - kBorder;
-    InputQueue input(preprocessor_, {});
-    TimeNs next = begin;
-    for (const EventPacket& packet : packets) {
-      input.offer(packet);
-      for (; next < end && input.feed_until(next); next += period) update(next, next > begin ? period : 0);
-      input.keep_rest();
-    }
-    return counter_.looks();
-  }
-
- private:
-  void update(TimeNs t, TimeNs span) {
-    const StartState at = start_at(poses_, t);
-    FusionState state;
-    state.t = t;
-    state.nav = {at.T_map_body, at.velocity};
-    state.angular_rate = at.angular_rate_body;
-    contours_.choose(state.nav.T_map_body);
-    contours_.project(state, to_seconds(span));
-    const RegistrationProblem problem{preprocessor_.kept(), preprocessor_.stamp(t), to_seconds(span),
-                                      contours_.samples(), no_covariance_};
-    if (span > 0) {
-      registration_.measure(problem);
-      counter_.add(problem, to_seconds(t - job_.start.t), registration_);
-    }
-    preprocessor_.set_motion(contours_.typical_flow_px_s());
-    preprocessor_.clear_kept();
-  }
-
-  const TrackJob& job_;
-  const TrackerConfig config_;
-  const std::vector<TimedPose>& poses_;
-  ContourIndex index_;
-  ContourSegments segments_;
-  ContourSelection contours_;
-  EventPreprocessor preprocessor_;
-  EventRegistration registration_;
-  LookCounter counter_;
-  const Matrix6d no_covariance_ = Matrix6d::Zero();
-};
 
 struct Class {
   std::string name;
@@ -211,6 +133,24 @@ void print_correlation(const Measured& m) {
                 truth[k].correlation, tracker[k].correlation);
 }
 
+/// What lasts, across contours of one direction, at the true pose.
+void print_lasting(const Measured& m) {
+  std::printf(
+      "\n| direction across the contour | looks | offset px | sigma px | of it lasts px | memory s |\n"
+      "|---|---|---|---|---|---|\n");
+  for (const double from : {-22.5, 22.5, 67.5, 112.5}) {
+    const Direction d{from};
+    Looks looks;
+    for (const ContourLook& l : m.truth)
+      if (d.holds(l)) looks.push_back(l);
+    const LookScatter all = scatter_of(those(looks, [](const ContourLook&) { return true; }),
+                                       [d](const ContourLook& l) { return d.sign(l) * left(l); });
+    const LookMemory memory = memory_of(correlation_over_time(looks));
+    std::printf("| %s | %d | %.3f | %.3f | %.3f | %.2f |\n", text(from + 22.5, " deg").c_str(), all.looks,
+                all.mean_px, all.sigma_px, all.sigma_px * std::sqrt(memory.share), memory.time_s);
+  }
+}
+
 }  // namespace
 
 std::vector<LookCorrelation> correlation_over_time(const std::vector<ContourLook>& looks) {
@@ -236,6 +176,26 @@ std::vector<LookCorrelation> correlation_over_time(const std::vector<ContourLook
   return out;
 }
 
+LookMemory memory_of(const std::vector<LookCorrelation>& correlations) {
+  constexpr double kLongest_s = 10;
+  constexpr int kFewest = 30;
+  LookMemory best;
+  double least = -1;
+  for (double time_s = 0.02; time_s < kLongest_s; time_s *= 1.05) {
+    double both = 0, square = 0, rest = 0;
+    for (const LookCorrelation& c : correlations) {
+      const double fall = std::exp(-0.5 * (c.least_s + c.most_s - LookCounter::kBlock_s) / time_s);
+      if (c.pairs < kFewest) continue;
+      both += fall * c.correlation, square += fall * fall;
+      rest += c.correlation * c.correlation;
+    }
+    const double share = square > 0 ? std::clamp(both / square, 0.0, 1.0) : 0;
+    const double off = rest - 2 * share * both + share * share * square;
+    if (least < 0 || off < least) least = off, best = {share, time_s};
+  }
+  return best.share > 0 ? best : LookMemory{};
+}
+
 Status print_residuals(const ResidualsRequest& request) {
   const auto config = configure(request.assignments);
   if (!config) return config.error();
@@ -245,8 +205,7 @@ Status print_residuals(const ResidualsRequest& request) {
     return Error{request.recording.folder, "no ground truth", "give a recording that has one"};
   const auto poses = tracked_poses(*streams);
   if (!poses) return poses.error();
-  const Measured m{PosedRegistration(streams->job, streams->job.truth).run(streams->packets),
-                   PosedRegistration(streams->job, *poses).run(streams->packets)};
+  const Measured m{looks_from(*streams, streams->job.truth), looks_from(*streams, *poses)};
   std::printf("### %s\n", request.recording.name.c_str());
   print_contrast(m);
   print_directions(m);
@@ -255,6 +214,7 @@ Status print_residuals(const ResidualsRequest& request) {
   print_classes("distance", m,
                 between({0, 2, 4, 8, 1e9}, " m", [](const ContourLook& l) { return l.depth_m; }));
   print_correlation(m);
+  print_lasting(m);
   if (request.picture.empty()) return {};
   return draw_residuals(request.picture, streams->job.setup.camera->size(), m.truth);
 }

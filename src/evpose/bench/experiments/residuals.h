@@ -16,8 +16,8 @@ struct ResidualsRequest {
 };
 
 /// Where events lie beside the contours of the true pose, as the measurement model has them and as they are:
-/// tables by contrast, polarity, speed, distance and direction, and how long an offset lasts. What is left
-/// over with the pose of the tracker stands beside it.
+/// tables by contrast, polarity, speed, distance and direction, and how long an offset lasts, by direction
+/// too. What is left over with the pose of the tracker stands beside it.
 Status print_residuals(const ResidualsRequest& request);
 
 /// Correlation of what is left over in two looks at one segment, by the time between them.
@@ -27,6 +27,13 @@ struct LookCorrelation {
   double correlation = 0;  ///< of the offsets without the noise of single looks
 };
 std::vector<LookCorrelation> correlation_over_time(const std::vector<ContourLook>& looks);
+
+/// Correlations as share * exp(-time / time_s), by least squares over those with 30 pairs or more.
+struct LookMemory {
+  double share = 0;   ///< of the variance, that lasts at all
+  double time_s = 0;  ///< up to 10; what is longer than looks are apart, is told by their fall alone
+};
+LookMemory memory_of(const std::vector<LookCorrelation>& correlations);
 
 /// Mean over looks, and their scatter about it beyond the noise of single looks.
 struct LookScatter {

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <random>
 
-#include "evpose/sim/sensors/event_pixels.h"
-
 namespace evpose::experiments {
 namespace {
 
@@ -119,6 +117,29 @@ TEST(Residuals, LastingOffsetsOfSegmentsAreScatterThatStaysCorrelated) {
   }
 }
 
+TEST(Residuals, TheMemoryOfAnOffsetIsFound) {
+  constexpr double kMemory_s = 0.5;
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  std::vector<ContourLook> looks;
+  const double fall = std::exp(-LookCounter::kBlock_s / kMemory_s);
+  for (std::uint32_t segment = 0; segment < 1600; ++segment) {
+    double lasting = 0.15 * normal(random);
+    for (std::int64_t block = 0; block < 40; ++block) {
+      ContourLook look;
+      look.segment = segment;
+      look.block = block;
+      const double middle = lasting + 0.1 * normal(random);
+      for (int i = 0; i < 40; ++i) look.on.add(std::clamp(middle + 0.1 * normal(random), -0.9, 0.9));
+      looks.push_back(look);
+      lasting = fall * lasting + 0.15 * std::sqrt(1 - fall * fall) * normal(random);
+    }
+  }
+  const LookMemory memory = memory_of(correlation_over_time(looks));
+  EXPECT_NEAR(memory.time_s, kMemory_s, 0.12);
+  EXPECT_NEAR(memory.share, 0.0225 / 0.0325, 0.08);
+}
+
 TEST(Residuals, TheNoiseOfFewEventsIsNoScatter) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
@@ -132,52 +153,6 @@ TEST(Residuals, TheNoiseOfFewEventsIsNoScatter) {
   }
   EXPECT_LT(measured(looks).sigma_px, 0.02);
   EXPECT_NEAR(looks[0].variance_px2(), 0.04 / 20, 0.001);
-}
-
-/// Mean place past the pixel's middle, px along the motion, of the simulated sensor's events at an edge that
-/// brightens or darkens by so many thresholds at a speed, after texture that moved its logarithm to and fro.
-double sensor_delay_px(double steps, double speed_px_s, bool on) {
-  sim::EventCameraConfig config;
-  config.bandwidth_hz_per_cd_m2 = config.leak_hz = config.threshold_sigma = config.hot_pixel_fraction = 0;
-  config.shot_noise_dark_hz = config.shot_noise_bright_hz = 0;
-  constexpr std::size_t kPixels = 2000;
-  sim::EventPixels pixels({static_cast<int>(kPixels), 1}, config, 11);
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
-  const double ratio = std::exp((on ? 1 : -1) * steps * config.threshold_on);
-  const TimeNs texture = 2 * kNsPerMs, crossing = from_seconds(1 / speed_px_s) / 50 * 50;
-  std::vector<sim::SimEvent> events;
-  double sum = 0, count = 0;
-  for (std::size_t i = 0; i < kPixels; ++i) {
-    TimeNs t = kNsPerMs;
-    double level = 20;
-    pixels.start(i, t, static_cast<float>(level));
-    events.clear();
-    const auto go = [&](double to, TimeNs span) {
-      pixels.advance(i, t, t + span, static_cast<float>(level), static_cast<float>(to), events);
-      level = to, t += span;
-    };
-    for (int k = 0; k < 1500; ++k) go(level * std::exp(0.012 * normal(random)), texture);
-    events.clear();
-    const TimeNs begin = t;
-    const double before = level;
-    for (int k = 1; k <= 50; ++k) go(before * (1 + (ratio - 1) * k / 50), crossing / 50);
-    for (const sim::SimEvent& e : events) {
-      if (e.on != on) continue;
-      sum += to_seconds(e.t - begin) / to_seconds(crossing) - 0.5;
-      ++count;
-    }
-  }
-  return sum / count;
-}
-
-TEST(EdgeDelayLaw, HoldsForTheSimulatedSensor) {
-  for (const double steps : {0.7, 1.5, 3.0, 6.0})
-    for (const double speed_px_s : {20.0, 300.0}) {
-      const EdgeDelay law = edge_delay(steps, 0.25);
-      EXPECT_NEAR(sensor_delay_px(steps, speed_px_s, true), law.on_px, 0.03) << steps << ' ' << speed_px_s;
-      EXPECT_NEAR(sensor_delay_px(steps, speed_px_s, false), law.off_px, 0.03) << steps << ' ' << speed_px_s;
-    }
 }
 
 }  // namespace

@@ -10,6 +10,9 @@ namespace {
 /// Without changes of velocity and of angular rate beyond these, over half a second, every error of the
 /// calibration is the same as one of the pose.
 constexpr double kLeastVelocity_m_s = 0.05, kLeastRate_rad_s = 0.05, kExcitation_s = 0.5;
+/// What changes of the angular rate faster than this is vibration. A pixel answers to it late, and by
+/// crossings back and forth, so that it tells of the time offset to no more than this.
+constexpr double kVibration_s = 0.03, kVibrationSigma_s = 2e-3;
 
 }  // namespace
 
@@ -57,6 +60,7 @@ void CalibrationStates::start(ErrorStateFilter& filter) {
   motion_mean_.head<3>() = state.nav.velocity;
   motion_mean_.tail<3>() = state.angular_rate;
   motion_square_ = motion_mean_.cwiseAbs2();
+  rate_mean_ = rate_mean_of_mean_ = state.angular_rate;
   judged_ = state.t;
   if (started_) {
     for (const PoseShift& shift : pose_shifts(state)) {
@@ -77,6 +81,10 @@ void CalibrationStates::start(ErrorStateFilter& filter) {
   gravity_ = add(config_.gravity, Eigen::VectorXd::Constant(2, config_.start_gravity_sigma_rad));
   intrinsics_ = add(config_.intrinsics, config_.start_intrinsics_sigma);
   if (intrinsics_) found_.intrinsics.setZero(config_.start_intrinsics_sigma.size());
+  if (time_) {
+    vibration_ = filter.add_block(Eigen::VectorXd::Constant(1, kVibrationSigma_s));
+    filter.set_considered(*vibration_, true);
+  }
   correlate(filter);
   state_sigmas(filter);
 }
@@ -104,6 +112,9 @@ void CalibrationStates::propagate(ErrorStateFilter& filter, const Eigen::Vector3
 void CalibrationStates::judge_excitation(ErrorStateFilter& filter) {
   const FusionState& state = filter.state();
   const double share = 1 - std::exp(-to_seconds(state.t - judged_) / kExcitation_s);
+  const double slow = 1 - std::exp(-to_seconds(state.t - judged_) / kVibration_s);
+  rate_mean_ += slow * (state.angular_rate - rate_mean_);
+  rate_mean_of_mean_ += slow * (rate_mean_ - rate_mean_of_mean_);
   judged_ = state.t;
   Vector6d now;
   now.head<3>() = state.nav.velocity;
@@ -123,6 +134,11 @@ std::vector<PoseShift> CalibrationStates::pose_shifts(const FusionState& state) 
   if (time_) shifts.push_back({*time_, seen_pose_by_time_offset(state)});
   if (rotation_) shifts.push_back({*rotation_, seen_pose_by_rotation(state, T_body_cam_.p + found_.shift)});
   if (translation_) shifts.push_back({*translation_, seen_pose_by_translation(state)});
+  if (vibration_) {
+    Vector6d vibration = Vector6d::Zero();
+    vibration.tail<3>() = state.angular_rate - (2 * rate_mean_ - rate_mean_of_mean_);
+    shifts.push_back({*vibration_, vibration});
+  }
   return shifts;
 }
 

@@ -59,9 +59,11 @@ class CalibrationStates {
   Pose T_body_cam_;  ///< as given
   Calibration found_;
   bool started_ = false;
-  std::optional<BlockId> time_, rotation_, translation_, gravity_, intrinsics_;
+  std::optional<BlockId> time_, vibration_, rotation_, translation_, gravity_, intrinsics_;
   // Mean and mean square of (velocity, rate) over the last half second.
   Vector6d motion_mean_ = Vector6d::Zero(), motion_square_ = Vector6d::Zero();
+  /// Of the angular rate, rad/s, and of that mean: twice the one less the other follows an even change.
+  Eigen::Vector3d rate_mean_ = Eigen::Vector3d::Zero(), rate_mean_of_mean_ = Eigen::Vector3d::Zero();
   TimeNs judged_ = 0;
 };
 

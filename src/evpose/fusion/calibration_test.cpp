@@ -19,12 +19,20 @@ struct Wrong {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
   bool hover = false;
+  double vibration_late_s = 0;        ///< the camera sees the airframe's vibration, not its flight, so late
   bool seen_anew = false;             ///< the flight begins with a pose of the camera, as a search finds it
   std::vector<double> offsets_m;      ///< of the segments of the map; none: the pose is measured as a whole
   Vector6d start = Vector6d::Zero();  ///< error of the pose at the start
 };
 
 ImuSample still(TimeNs t) { return {t, {0, 0, 0}, -kGravity}; }
+
+constexpr double kVibration_rad_s = 0.5, kVibrationOmega_rad_s = 2 * M_PI * 90;
+
+/// About x, of the body.
+double vibration_angle_rad(double s) {
+  return -kVibration_rad_s / kVibrationOmega_rad_s * std::cos(kVibrationOmega_rad_s * s);
+}
 
 ImuSample moving(TimeNs t) {
   const double s = to_seconds(t);
@@ -126,6 +134,8 @@ Flight make_flight(const Wrong& wrong, int seconds, std::mt19937& random) {
   const double rate = std::sqrt(1 / to_seconds(kStep));
   for (int k = 0; k < samples; ++k) {
     clean.push_back(wrong.hover ? still(k * kStep) : moving(k * kStep));
+    if (wrong.vibration_late_s != 0)
+      clean.back().gyro.x() += kVibration_rad_s * std::sin(kVibrationOmega_rad_s * to_seconds(k * kStep));
     if (k > 0)
       out.truth.push_back(
           strapdown(out.truth.back(), clean[clean.size() - 2], clean.back(), {0, 0, 0}, {0, 0, 0}, gravity));
@@ -178,6 +188,8 @@ Found fly(const Wrong& wrong, const FusionConfig& config, int seconds, unsigned 
     }
     Vector6d scatter;
     scatter << draw(random, 1e-3), draw(random, 5e-4);
+    const double s = to_seconds(static_cast<TimeNs>(k) * kStep);
+    scatter(3) += vibration_angle_rad(s - wrong.vibration_late_s) - vibration_angle_rad(s);
     const Pose T_map_cam = truth[k].T_map_body.plus(scatter) * true_T_body_cam;
     PoseInformation m;
     Vector6d information;
@@ -214,6 +226,17 @@ TEST(Calibration, TimeOffsetOfTwentyMillisecondsIsFoundToATenth) {
     EXPECT_LT(std::abs(found.time_offset_s - offset_s), 4 * found.time_sigma_s + 1e-5);
     EXPECT_FALSE(found.frozen);
   }
+}
+
+TEST(Calibration, VibrationThatIsSeenLateIsNotTakenForATimeOffset) {
+  CalibrationConfig c = coarse();
+  c.time_offset = true;
+  c.start_time_sigma_s = 2e-3;
+  Wrong wrong;
+  wrong.vibration_late_s = 2e-3;
+  const Calibration found = fly(wrong, c, 5).calibration;
+  EXPECT_LT(std::abs(found.time_offset_s), 2e-4);
+  EXPECT_LT(std::abs(found.time_offset_s), 4 * found.time_sigma_s);
 }
 
 TEST(Calibration, RotationOfOneDegreeIsFoundToAFiftieth) {
@@ -320,7 +343,7 @@ TEST(Calibration, BeginsAsCorrelatedAsItIsStated) {
   filter.reset_state(state);
   CalibrationStates(c, {}).start(filter);
   const Eigen::MatrixXd P =
-      filter.joint_covariance().bottomRightCorner(8, 8);  // time, translation, intrinsics
+      filter.joint_covariance().bottomRightCorner(9, 9);  // time, translation, intrinsics, vibration
   const double place_m = c.start_translation_sigma_m.x();
   EXPECT_DOUBLE_EQ(P(4, 5), 0.9 * 2 * 3);
   EXPECT_DOUBLE_EQ(P(6, 2), -0.6 * 0.5 * place_m);
@@ -342,7 +365,7 @@ TEST(Calibration, TheSeenPoseDependsOnItAsDifferencesSay) {
   CalibrationStates states(c, given);
   states.start(filter);
   const std::vector<PoseShift> shifts = states.pose_shifts(state);
-  ASSERT_EQ(shifts.size(), 3U);
+  ASSERT_EQ(shifts.size(), 4U);
   // The pose that a camera sees that is mounted, and timed, otherwise than given.
   const auto seen = [&](const Eigen::Matrix<double, 7, 1>& d) {
     const Pose body{state.nav.T_map_body.q * so3::exp(d(0) * state.angular_rate),
@@ -357,11 +380,13 @@ TEST(Calibration, TheSeenPoseDependsOnItAsDifferencesSay) {
   }
   got << shifts[0].by_block, shifts[1].by_block, shifts[2].by_block;
   EXPECT_LT((got - expected).cwiseAbs().maxCoeff(), 1e-7);
+  EXPECT_EQ(shifts[3].by_block, Vector6d::Zero());  // no vibration yet
 }
 
 /// A camera that is mounted and timed otherwise than given, before a map whose segments stand off.
 TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
-  constexpr int kRuns = 8, kSegments = 24, kStates = 7 + kSegments;
+  constexpr int kRuns = 8, kSegments = 24,
+                kStates = 8 + kSegments;  // the eighth: vibration, which is only considered
   CalibrationConfig c = coarse();
   c.time_offset = c.rotation = c.translation = true;
   c.start_time_sigma_s = 3e-3;
@@ -389,10 +414,10 @@ TEST(Calibration, IsFoundTogetherWithTheOffsetsOfTheMap) {
     Eigen::VectorXd error(kStates);
     error << wrong.offset_s - found.calibration.time_offset_s,
         so3::log(so3::exp(wrong.turn) * found.calibration.turn.conjugate()),
-        wrong.shift - found.calibration.shift, Eigen::VectorXd::Zero(kSegments);
+        wrong.shift - found.calibration.shift, Eigen::VectorXd::Zero(1 + kSegments);
     for (int i = 0; i < kSegments; ++i) {
       const SegmentOffsets::Segment& segment = found.segments[static_cast<std::size_t>(i)];
-      error(7 + i) = wrong.offsets_m[segment.number] - segment.offset_m;
+      error(8 + i) = wrong.offsets_m[segment.number] - segment.offset_m;
     }
     nees += error.dot(found.covariance.ldlt().solve(error)) / kStates / kRuns;
     const Eigen::VectorXd sigma = found.covariance.diagonal().cwiseSqrt();

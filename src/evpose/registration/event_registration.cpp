@@ -68,6 +68,7 @@ EventRegistration::EventRegistration(ImageSize size, const EventRegistrationConf
       index_(size, kHalfLength_px, kAmbiguity_px),
       contrast_(segments, config.contrast_threshold, config.trail_filter),
       trust_(config.judge_contours ? segments : 0),
+      lasting_(config.judge_contours ? 0 : segments),
       sums_(config.contrast_band_px, config.polarity),
       clusters_(Cells(size).clusters()) {}
 
@@ -259,11 +260,24 @@ bool EventRegistration::owns_probe(std::size_t sample, float half_span_us) const
   return index_.find(x, y, half_span_us).band == static_cast<std::int32_t>(sample);
 }
 
+/// By what each sample asked for.
+void EventRegistration::learn_lasting_offsets(std::span<const ContourSample> samples, double span_s) {
+  if (config_.judge_contours) return;
+  asking_.clear();
+  for (const SampleOffset& o : offsets_) {
+    const ContourSample& s = samples[o.sample];
+    const double weight = sums_.sum(o.sample).weight;
+    asking_.push_back({s.segment, s.normal_side, weight, weight * o.offset_px, s.map_sigma_px, &s.jacobian});
+  }
+  lasting_.judge(span_s, asking_);
+}
+
 /// Tells the contrast memory what area each segment has swept, owned length times way, and what events fell
 /// there.
 void EventRegistration::learn(std::span<const ContourSample> samples, double span_s) {
   if (!std::exchange(learns_, false)) return;
   ++call_;
+  learn_lasting_offsets(samples, span_s);
   const auto half_span_us = static_cast<float>(0.5e6 * span_s);
   const double swept_s = kProbeEvery * span_s;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -337,8 +351,9 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
     const double by_clutter = 1 + c.clutter / c.weight;
     const double shared = repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px * by_clutter +
                                      (c.map_variance + c.delay_variance) / c.weight);
+    const std::uint32_t segment = p.samples[i].segment;
     const double borne_out =
-        config_.judge_contours ? trust_.trust(p.samples[i].segment, concentration_.value()) : 1;
+        config_.judge_contours ? trust_.trust(segment, concentration_.value()) : lasting_.trust(segment);
     const double scale = gathered * borne_out * c.trust * own / (own + shared) / event_variance;
     if (c.trust < 0.5) result->other_motion += sum.events;
     const Vector6d& J = p.samples[i].jacobian;

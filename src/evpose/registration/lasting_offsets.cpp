@@ -14,7 +14,8 @@ constexpr double kMemory_s = 0.5;
 constexpr double kKnown = 20;       // weight of events by which half of an offset is believed
 constexpr double kFewest = 5;       // likewise, by which it counts for the pose's motion
 constexpr double kLimit_px = 0.25;  // a segment that stands so far off keeps half of its information
-constexpr double kPrior = 1e-3;     // of a motion that the contours do not tell, beside one that they do
+constexpr double kMostTaken = 0.1, kMostOff = 0.35;  // of all weight: what is taken away; what may stand off
+constexpr double kPrior = 1e-3;  // of a motion that the contours do not tell, beside one that they do
 
 /// Steep: contours within a tenth of a pixel are the rule, and lose nothing.
 double kept(double offset_px, double map_variance_px2) {
@@ -30,7 +31,12 @@ void LastingOffsets::rearrange(std::span<const std::uint32_t> before) {
     if (before[i] != ContrastMemory::kNew) segments_[i] = old[before[i]];
 }
 
-void LastingOffsets::forget() { segments_.assign(segments_.size(), {}); }
+void LastingOffsets::forget() {
+  segments_.assign(segments_.size(), {});
+  standing_off_ = 0;
+}
+
+bool LastingOffsets::agree() const { return standing_off_ <= kMostOff; }
 
 void LastingOffsets::remember(const Sample& s) {
   Segment& segment = segments_[s.segment];
@@ -74,6 +80,23 @@ void LastingOffsets::judge(double span_s, std::span<const Sample> samples) {
     const double left_px = segment.mean_px() - segment.by_motion_px / segment.samples;
     segment.trust = kept(left_px * segment.weight / (segment.weight + kKnown),
                          segment.map_variance_px2 / segment.samples);
+  }
+  spare(samples);
+}
+
+/// A tenth of all weight is taken away at most: where more stands off, it may be the pose that is wrong.
+void LastingOffsets::spare(std::span<const Sample> samples) {
+  double all = 0, lost = 0;
+  for (const Sample& s : samples) {
+    all += s.weight;
+    lost += s.weight * (1 - segments_[s.segment].trust);
+  }
+  if (all > 0) standing_off_ = lost / all;
+  if (standing_off_ <= kMostTaken) return;
+  for (const Sample& s : samples) {
+    Segment& segment = segments_[s.segment];
+    if (std::exchange(segment.samples, 0) > 0)  // once for each segment
+      segment.trust = 1 - kMostTaken / standing_off_ * (1 - segment.trust);
   }
 }
 

@@ -35,6 +35,9 @@ class LastingOffsets {
   void judge(double span_s, std::span<const Sample> samples);
   /// Share of its events' information that a segment may keep, 0..1.
   double trust(std::uint32_t segment) const { return segments_[segment].trust; }
+  /// Whether the contours agree on a pose but for a few. Where pixels are late by more than the gate, and
+  /// where the pose is off, events lie evenly in the gates, and each contour stands off in its own way.
+  bool agree() const;
 
  private:
   struct Segment {
@@ -47,9 +50,11 @@ class LastingOffsets {
     double mean_px() const { return asked_px / weight; }
   };
   void remember(const Sample& sample);
+  void spare(std::span<const Sample> samples);
   Vector6d motion(std::span<const Sample> samples) const;
 
   double now_s_ = 0;
+  double standing_off_ = 0;  ///< share of the events' weight that contours which stand off would lose
   std::vector<Segment> segments_;
 };
 

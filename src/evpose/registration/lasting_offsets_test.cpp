@@ -53,6 +53,7 @@ TEST(LastingOffsets, AContourBesideItsEventsLosesItsSayAndTheOthersKeepTheirs) {
   Scene scene;
   LastingOffsets lasting(kSegments);
   scene.show(lasting, 0.5, one_off);
+  EXPECT_TRUE(lasting.agree());
   for (std::uint32_t i = 0; i < kSegments; ++i)
     if (i == 3)
       EXPECT_LT(lasting.trust(i), 0.1);
@@ -74,6 +75,18 @@ TEST(LastingOffsets, APoseThatIsOffTakesNoContourItsSay) {
   scene.show(lasting, 0.5, asked);
   EXPECT_GT(largest_px, 0.8);
   for (std::uint32_t i = 0; i < kSegments; ++i) EXPECT_GT(lasting.trust(i), 0.95) << i;
+}
+
+TEST(LastingOffsets, WhereManyStandOffEachItsOwnWayLittleIsTakenAndTheContoursDoNotAgree) {
+  Scene scene;
+  LastingOffsets lasting(kSegments);
+  scene.show(lasting, 0.5, [](std::uint32_t i) { return i % 3 == 0 ? 0 : std::copysign(0.6, std::sin(7.0 * i)); });
+  EXPECT_FALSE(lasting.agree());
+  double kept = 0;
+  for (std::uint32_t i = 0; i < kSegments; ++i) kept += lasting.trust(i) / kSegments;
+  EXPECT_NEAR(kept, 0.9, 0.01);
+  scene.show(lasting, 2, one_off);
+  EXPECT_TRUE(lasting.agree());
 }
 
 TEST(LastingOffsets, WhatIsOverIsForgotten) {

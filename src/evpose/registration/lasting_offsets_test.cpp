@@ -80,7 +80,8 @@ TEST(LastingOffsets, APoseThatIsOffTakesNoContourItsSay) {
 TEST(LastingOffsets, WhereManyStandOffEachItsOwnWayLittleIsTakenAndTheContoursDoNotAgree) {
   Scene scene;
   LastingOffsets lasting(kSegments);
-  scene.show(lasting, 0.5, [](std::uint32_t i) { return i % 3 == 0 ? 0 : std::copysign(0.6, std::sin(7.0 * i)); });
+  scene.show(lasting, 0.5,
+             [](std::uint32_t i) { return i % 3 == 0 ? 0 : std::copysign(0.6, std::sin(7.0 * i)); });
   EXPECT_FALSE(lasting.agree());
   double kept = 0;
   for (std::uint32_t i = 0; i < kSegments; ++i) kept += lasting.trust(i) / kSegments;

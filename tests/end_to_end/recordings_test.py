@@ -43,7 +43,7 @@ def occluders(recording):
     return "--occluders", SHARED / f"data/peer/maps/{MAPS[recording]}_mesh.ply"
 
 
-# The contours of one direction, with people before them, have no events for the last 0.2 s.
+# The pose is right, but contours of one direction have no events for the last 0.2 s.
 ENDS = {"room_people": ("tracking", "degraded")}
 
 

@@ -49,7 +49,7 @@ class Scene {
 
 double one_off(std::uint32_t segment) { return segment == 3 ? 0.5 : 0; }
 
-TEST(LastingOffsets, AContourBesideItsEventsLosesItsSayAndTheOthersKeepTheirs) {
+TEST(LastingOffsets, AContourBesideItsEventsLosesWeightAndTheOthersKeepTheirs) {
   Scene scene;
   LastingOffsets lasting(kSegments);
   scene.show(lasting, 0.5, one_off);
@@ -61,7 +61,7 @@ TEST(LastingOffsets, AContourBesideItsEventsLosesItsSayAndTheOthersKeepTheirs) {
       EXPECT_GT(lasting.trust(i), 0.95) << i;
 }
 
-TEST(LastingOffsets, APoseThatIsOffTakesNoContourItsSay) {
+TEST(LastingOffsets, AnErrorOfThePoseTakesNoWeightFromContours) {
   Scene scene;
   LastingOffsets lasting(kSegments);
   Vector6d off;

@@ -13,7 +13,7 @@ namespace evpose {
 Eigen::Vector2d half_view(const Camera& camera);
 
 /// Scores of a pose, and of those that differ from it by a turn of the camera: these move all contours alike
-/// in the image, so that one projection of the contours tells 64 of them. A contour point is scored by where
+/// in the image, so that one projection of the contours tells 256 of them. A contour point is scored by where
 /// it is seen, and in which direction, for a camera without distortion: one look-up.
 class CoarseScores {
  public:
@@ -23,7 +23,7 @@ class CoarseScores {
   /// Positions and tangents of every `step`-th of the points to ask, relative to `origin`.
   void set_points(std::span<const SearchPoint> points, std::size_t step, const Eigen::Vector3d& origin);
 
-  /// The best of 8 x 8 turns, of 2 px each.
+  /// The best of 16 x 16 turns, of 3 px each.
   struct Turned {
     Eigen::Vector3d turn;  ///< rotation vector, camera frame: R_map_cam becomes R_map_cam * exp(turn)
     double score;          ///< mean over the points; what score_pose() says up to the table's steps
@@ -31,7 +31,7 @@ class CoarseScores {
   Turned best_turn(const Eigen::Matrix3f& R_cam_map, const Eigen::Vector3f& offset) const;
 
  private:
-  static constexpr int kTurns = 8;  ///< along each axis of the image
+  static constexpr int kTurns = 16;  ///< along each axis of the image
   std::size_t entry(int column, int row, int direction) const {
     return (static_cast<std::size_t>(direction) * static_cast<std::size_t>(rows_) +
             static_cast<std::size_t>(row)) *

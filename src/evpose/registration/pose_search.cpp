@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -13,24 +14,25 @@
 namespace evpose {
 namespace {
 
-constexpr int kGuesses = 6000;                // with 64 turns of each
-constexpr std::size_t kRefined = 64;          // of the guesses
-constexpr std::size_t kKept = 16;             // of the refined ones, for later slices to choose from
-constexpr double kSeenShare = 0.3;            // of the contours in view, motion makes so many visible
-constexpr std::size_t kComparedPoints = 200;  // enough to rank guesses
-constexpr double kOutsideScore = -0.3;        // of a point that has left the image: neither good nor bad
-constexpr double kCorrelatedPoints = 10;      // so many points share one error
-constexpr std::size_t kRefinedPoints = 250;   // enough to move a guess to its optimum
-constexpr int kIterations = 3;                // at each width of the kernel
-constexpr double kLastReach_px = 3;           // of the refinement with all points
-constexpr double kNarrowing = 0.6;            // of the kernel, from width to width
-constexpr double kNarrowest_px = 1;           // the sharpness of the edges
-constexpr double kConverged = 0.05;    // a step below this share of the kernel's width ends the iterations
-constexpr double kApart_px = 8;        // of those to refine: that far the turns and the refinement reach
-constexpr double kDifferent_px = 3;    // poses that move the points by less are one
-constexpr double kTypicalDepth_m = 3;  // turns metres into pixels where poses are compared
-constexpr double kNearest_m = 0.05;    // points nearer to the camera are not projected
-constexpr double kMargin_px = 2;       // the field is interpolated inside of this
+constexpr int kGuesses = 6000;               // with 256 turns of each
+constexpr std::size_t kRefined = 64;         // of the guesses
+constexpr std::size_t kKept = 16;            // of the refined ones, for later slices to choose from
+constexpr double kSeenShare = 0.3;           // of the contours in view, motion makes so many visible
+constexpr double kOutsideScore = -0.3;       // of a point that has left the image: neither good nor bad
+constexpr double kCorrelatedPoints = 10;     // so many points share one error
+constexpr std::size_t kRefinedPoints = 250;  // enough to move a guess to its optimum
+constexpr int kIterations = 3;               // at each width of the kernel
+constexpr double kFirstReach_px = 4;         // of guesses: a wider one leaves them for texture
+constexpr double kLastReach_px = 3;          // of the refinement with all points
+constexpr double kNarrowing = 0.6;           // of the kernel, from width to width
+constexpr double kNarrowest_px = 1;          // the sharpness of the edges
+constexpr double kConverged = 0.05;      // a step below this share of the kernel's width ends the iterations
+constexpr double kApart_px = 5;          // of those to refine: that far the turns and the refinement reach
+constexpr std::size_t kSeenPoints = 12;  // by which poses are told apart
+constexpr double kDifferent_px = 1;      // poses that see the points nearer to each other are one
+constexpr double kTypicalDepth_m = 3;    // turns metres into pixels where poses are compared
+constexpr double kNearest_m = 0.05;      // points nearer to the camera are not projected
+constexpr double kMargin_px = 2;         // the field is interpolated inside of this
 
 double uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
 
@@ -84,12 +86,6 @@ double image_motion_px(const Vector6d& step, double focal_px) {
   return focal_px * (step.head<3>().norm() / kTypicalDepth_m + step.tail<3>().norm());
 }
 
-/// The same between two poses, for small angles.
-double image_motion_px(const Pose& a, const Pose& b, double focal_px) {
-  const double turn = 2 * (a.q.conjugate() * b.q).vec().norm();
-  return focal_px * ((a.p - b.p).norm() / kTypicalDepth_m + turn);
-}
-
 /// Normal equations of the distances between contours and edges at `pose`, weighted by a kernel of this
 /// width, with the prior around `from`.
 struct NormalEquations {
@@ -132,7 +128,7 @@ std::vector<PoseGuess> draw_guesses(const SearchView& view, const Pose& prior, c
   const Matrix6d root = covariance.llt().matrixL();
   CoarseScores scores(view.field, view.camera, static_cast<float>(kSeenShare),
                       static_cast<float>(kOutsideScore));
-  scores.set_points(view.points, std::max<std::size_t>(1, view.points.size() / kComparedPoints), prior.p);
+  scores.set_points(view.points, 1, prior.p);
   const Pose T_cam_body = view.T_body_cam.inverse();
   std::vector<PoseGuess> guesses(kGuesses);
   for (PoseGuess& g : guesses) {
@@ -144,6 +140,32 @@ std::vector<PoseGuess> draw_guesses(const SearchView& view, const Pose& prior, c
     g.T_map_body = Pose{(T_map_cam.q * so3::exp(best.turn)).normalized(), T_map_cam.p} * T_cam_body;
   }
   return guesses;
+}
+
+/// A guess, and where it sees some of the points: guesses are alike that see them alike, however a turn makes
+/// up for a shift.
+struct SeenGuess : PoseGuess {
+  std::array<Eigen::Vector2d, kSeenPoints> pixels;
+};
+
+/// As keep_different() of poses that see the points `apart_px` apart, root mean square.
+void keep_seen_differently(std::vector<PoseGuess>& guesses, std::size_t most, double apart_px,
+                           const SearchView& view) {
+  std::vector<SeenGuess> seen(guesses.size());
+  for (std::size_t i = 0; i < guesses.size(); ++i) {
+    static_cast<PoseGuess&>(seen[i]) = guesses[i];
+    const Pose T_cam_map = (guesses[i].T_map_body * view.T_body_cam).inverse();
+    for (std::size_t k = 0; k < kSeenPoints; ++k) {
+      const Eigen::Vector3d x = T_cam_map * view.points[k * view.points.size() / kSeenPoints].position;
+      seen[i].pixels[k] = view.camera.focal_px() * x.head<2>() / std::max(x.z(), kNearest_m);
+    }
+  }
+  keep_different(seen, most, [apart_px](const SeenGuess& a, const SeenGuess& b) {
+    double sum = 0;
+    for (std::size_t k = 0; k < kSeenPoints; ++k) sum += (a.pixels[k] - b.pixels[k]).squaredNorm();
+    return sum < kSeenPoints * apart_px * apart_px;
+  });
+  guesses.assign(seen.begin(), seen.end());
 }
 
 /// So many of the points, evenly.
@@ -188,15 +210,9 @@ PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& 
 
 std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
                                    unsigned seed) {
-  const double focal_px = view.camera.focal_px();
   std::vector<PoseGuess> guesses = draw_guesses(view, prior, covariance, seed);
   const PoseGuess first = guesses.front();
-  const auto nearer_than = [focal_px](double px) {
-    return [=](const PoseGuess& a, const PoseGuess& b) {
-      return image_motion_px(a.T_map_body, b.T_map_body, focal_px) < px;
-    };
-  };
-  keep_different(guesses, kRefined, nearer_than(kApart_px));
+  keep_seen_differently(guesses, kRefined, kApart_px, view);
   guesses.push_back(first);
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
   const double evidence = static_cast<double>(view.points.size()) / kCorrelatedPoints;
@@ -208,9 +224,9 @@ std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, co
       const Vector6d off = g.T_map_body.minus(prior);
       g.score -= 0.5 * off.dot(information * off) / evidence;
     }
-    keep_different(guesses, kKept, nearer_than(kDifferent_px));
+    keep_seen_differently(guesses, kKept, kDifferent_px, view);
   };
-  refine(coarse, refine_reach_px());
+  refine(coarse, kFirstReach_px);
   refine(view, kLastReach_px);
   return guesses;
 }

@@ -19,6 +19,7 @@ constexpr double kHopeless_s = 1;     // without a search
 constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
 // Of one that was found among many: as far off as others explain the events nearly as well.
 constexpr double kFoundPosition_m = 0.03, kFoundRotation_rad = 0.01;
+constexpr double kFoundFades_s = 0.5;  // while events confirm it, in a map that states none
 // A pose that was right slides along the contours that are left.
 constexpr double kSlides_m_s = 0.3, kSlides_rad_s = 0.1;
 constexpr const char* kContradiction =
@@ -69,6 +70,7 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   verify_until_ = input.t + from_seconds(Relocalizer::kVerify_s);
   verifier_.restart();
   verified_ = false;
+  found_doubt_ = map_may_be_wrong_ ? 0 : 1;
   confirmed_s_ = contradicted_s_ = 0;
   return state;
 }
@@ -77,7 +79,14 @@ void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   const PoseVerdict verdict = verifying() ? verifier_.verdict_of_found() : verifier_.verdict();
   // Without events there is no new evidence: a scene at rest does not confirm a pose that was found.
   const double confirming_s = accepted || !verifying() ? span_s : 0;
-  confirmed_s_ = verdict == PoseVerdict::confirmed ? confirmed_s_ + confirming_s : 0;
+  if (verdict == PoseVerdict::confirmed) {
+    confirmed_s_ += confirming_s;
+    found_doubt_ *= std::exp(-span_s / kFoundFades_s);
+  }
+  // In texture one direction may go without clearly more events for a while, of right poses and of wrong
+  // ones.
+  const bool waits = verdict == PoseVerdict::contested && verifying() && !map_may_be_wrong_;
+  if (verdict != PoseVerdict::confirmed && !waits) confirmed_s_ = 0;
   contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
   // Some of the contours that are built of a cloud are where nothing is.
   const bool given_agrees =
@@ -104,6 +113,8 @@ Matrix6d PoseSupervisor::doubt() const {
     position_m = kDoubtPosition_m, rotation_rad = kDoubtRotation_rad;
   else if (is_contested())
     position_m = kSlides_m_s * contested_s_, rotation_rad = kSlides_rad_s * contested_s_;
+  position_m = std::hypot(position_m, found_doubt_ * kFoundPosition_m);
+  rotation_rad = std::hypot(rotation_rad, found_doubt_ * kFoundRotation_rad);
   Matrix6d out = Matrix6d::Zero();
   out.diagonal().head<3>().setConstant(position_m * position_m);
   out.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad);

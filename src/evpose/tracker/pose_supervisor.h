@@ -83,7 +83,8 @@ class PoseSupervisor {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
   }
   /// The pose's covariance, after judge(): what the fusion states, and more while events contradict the pose,
-  /// while one that was found is not verified, while its contours of one direction lie where no events are,
+  /// while one that was found is not verified or was so lately, while its contours of one direction lie where
+  /// no events are,
   /// and, in a map that states errors, where events that do not gather have made the pose seem better known.
   Matrix6d told_covariance(const FusionState& reported, const UpdateEvidence& evidence);
 
@@ -117,6 +118,7 @@ class PoseSupervisor {
   double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
   double contested_s_ = 0;     ///< for how long in a row one direction's contours have had none
   double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it
+  double found_doubt_ = 0;     ///< of a pose that was found, from 1 on; 0: it was given
   bool start_is_unsure_ = false;
   bool verified_ = false;  ///< the events have confirmed the pose since it was given or found
 };

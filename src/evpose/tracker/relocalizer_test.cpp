@@ -340,6 +340,18 @@ TEST_F(RelocalizerLaws, APoseFoundIsVerifiedBeforeItIsCalledTracking) {
   EXPECT_GE(to_seconds(tracking->t - found->t), Relocalizer::kVerify_s - 1e-6);
 }
 
+/// Others may explain the events as well: only the time for which they go on to agree tells.
+TEST_F(RelocalizerLaws, TheSigmaOfAPoseFoundFallsWhileEventsConfirmIt) {
+  const auto updates = track({}, 0.8);
+  const auto first = std::ranges::find(updates, Health::tracking, &Update::health);
+  ASSERT_NE(first, updates.end());
+  const auto sigma_m = [](const Update& u) { return std::sqrt(u.covariance(0, 0)); };
+  EXPECT_GT(sigma_m(*first), 0.015);
+  const double elapsed_s = to_seconds(updates.back().t - first->t);
+  EXPECT_GT(elapsed_s, 0.25);
+  EXPECT_NEAR(sigma_m(updates.back()) / sigma_m(*first), std::exp(-elapsed_s / 0.5), 0.1);
+}
+
 TEST_F(RelocalizerLaws, SilenceDoesNotConfirmAPoseThatWasFound) {
   Run run;
   const auto seen = track(run, 0.35);

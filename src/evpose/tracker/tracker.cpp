@@ -250,6 +250,7 @@ void Tracker::search_pose(TimeNs t, const ImuIncrement& moved) {
   registration_->restart();
   if (frames_) frames_->restart();
   imu_.restart_comparison();
+  if (!adjusted_) start_alignment_.reset();  // the search has looked at the same events under narrower gates
   contours_.choose(found->nav.T_map_body);
 }
 

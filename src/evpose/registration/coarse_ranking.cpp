@@ -62,13 +62,12 @@ void CoarseScores::fill_cell(const EdgeField& field, const Camera& camera, int c
   }
 }
 
-void CoarseScores::set_points(std::span<const SearchPoint> points, std::size_t step,
-                              const Eigen::Vector3d& origin) {
-  count_ = (points.size() + step - 1) / step;
+void CoarseScores::set_points(std::span<const SearchPoint> points, const Eigen::Vector3d& origin) {
+  count_ = points.size();
   points_.resize(6 * count_);
   entries_.resize(count_);
   for (std::size_t i = 0; i < count_; ++i) {
-    const SearchPoint& point = points[i * step];
+    const SearchPoint& point = points[i];
     for (std::size_t k = 0; k < 3; ++k) {
       points_[k * count_ + i] =
           static_cast<float>(point.position[static_cast<int>(k)] - origin[static_cast<int>(k)]);

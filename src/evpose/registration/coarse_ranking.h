@@ -20,8 +20,8 @@ class CoarseScores {
   /// `seen_share`, `outside_score`: as in score_pose().
   CoarseScores(const EdgeField& field, const Camera& camera, float seen_share, float outside_score);
 
-  /// Positions and tangents of every `step`-th of the points to ask, relative to `origin`.
-  void set_points(std::span<const SearchPoint> points, std::size_t step, const Eigen::Vector3d& origin);
+  /// Positions and tangents of the points to ask, relative to `origin`.
+  void set_points(std::span<const SearchPoint> points, const Eigen::Vector3d& origin);
 
   /// The best of 16 x 16 turns, of 3 px each.
   struct Turned {

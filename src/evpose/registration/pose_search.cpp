@@ -128,7 +128,7 @@ std::vector<PoseGuess> draw_guesses(const SearchView& view, const Pose& prior, c
   const Matrix6d root = covariance.llt().matrixL();
   CoarseScores scores(view.field, view.camera, static_cast<float>(kSeenShare),
                       static_cast<float>(kOutsideScore));
-  scores.set_points(view.points, 1, prior.p);
+  scores.set_points(view.points, prior.p);
   const Pose T_cam_body = view.T_body_cam.inverse();
   std::vector<PoseGuess> guesses(kGuesses);
   for (PoseGuess& g : guesses) {

@@ -117,7 +117,7 @@ TEST_F(PoseSearchLaws, TheTruePoseScoresBest) {
 
 TEST_F(PoseSearchLaws, TheTableOfScoresSaysWhatTheFieldDoesOfTheBestTurn) {
   CoarseScores table(field_, *camera_, 0.3F, -0.3F);
-  table.set_points(points_, 1, Eigen::Vector3d::Zero());
+  table.set_points(points_, Eigen::Vector3d::Zero());
   for (int axis = 0; axis < 6; ++axis)
     for (const double off : {0.0, 0.01, -0.02, 0.2}) {
       Vector6d d = Vector6d::Zero();
@@ -131,7 +131,7 @@ TEST_F(PoseSearchLaws, TheTableOfScoresSaysWhatTheFieldDoesOfTheBestTurn) {
 
 TEST_F(PoseSearchLaws, ATurnWithinReachIsTurnedBack) {
   CoarseScores table(field_, *camera_, 0.3F, -0.3F);
-  table.set_points(points_, 1, Eigen::Vector3d::Zero());
+  table.set_points(points_, Eigen::Vector3d::Zero());
   const double px = 1 / camera_->focal_px();
   for (const Eigen::Vector2d& off_px :
        {Eigen::Vector2d(5, 0), Eigen::Vector2d(-3, 6), Eigen::Vector2d(4, -5)}) {

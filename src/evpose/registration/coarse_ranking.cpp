@@ -8,7 +8,7 @@
 namespace evpose {
 namespace {
 
-constexpr double kCell_px = 3;       // of the table, and the step of turns; the fine spread is 2 px
+constexpr double kCell_px = 2;       // of the table, and the step of turns; the fine spread is 1.5 px
 constexpr double kWidestTan = 2.5;   // of an image that is wider, the rim is left out
 constexpr float kNearest_m = 0.05F;  // points nearer to the camera are not projected
 constexpr double kMargin_px = 2;

@@ -23,7 +23,7 @@ class CoarseScores {
   /// Positions and tangents of the points to ask, relative to `origin`.
   void set_points(std::span<const SearchPoint> points, const Eigen::Vector3d& origin);
 
-  /// The best of 16 x 16 turns, of 3 px each.
+  /// The best of 16 x 16 turns, of 2 px each.
   struct Turned {
     Eigen::Vector3d turn;  ///< rotation vector, camera frame: R_map_cam becomes R_map_cam * exp(turn)
     double score;          ///< mean over the points; what score_pose() says up to the table's steps

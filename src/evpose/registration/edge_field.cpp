@@ -15,7 +15,7 @@ constexpr int kBlock_cells = 16;         // the background is averaged over 5 x 
 constexpr int kNeighbourBlocks = 2;
 constexpr float kLeastBackground = 0.01F;  // bounds the weight of a lone edge
 constexpr float kCoarse_px = 6;            // reaches from one random guess to the next
-constexpr float kFine_px = 2;  // what a slice of some milliseconds leaves of a contour's sharpness
+constexpr float kFine_px = 1.5F;  // what a slice of some milliseconds leaves of a contour's sharpness
 
 }  // namespace
 

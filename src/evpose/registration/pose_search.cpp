@@ -210,6 +210,7 @@ PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& 
 
 std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
                                    unsigned seed) {
+  if (view.points.empty()) return {};
   std::vector<PoseGuess> guesses = draw_guesses(view, prior, covariance, seed);
   const PoseGuess first = guesses.front();
   keep_seen_differently(guesses, kRefined, kApart_px, view);

@@ -24,9 +24,10 @@ constexpr double kSpikeSigma = 8;
 constexpr double kSpikeRate[] = {300, 5e3};  // rad/s^2, m/s^3
 constexpr double kLeastSpike[] = {0.3, 5};   // rad/s, m/s^2
 constexpr int kSpikeSamples = 3;
-constexpr double kLearnChange = 0.02;  // share of a sample in the usual change
-constexpr double kDoubt_s = 0.5;       // stamps are doubted so long after a gap or a step back
-constexpr double kRemember_s = 0.05;   // a fault is reported so long after its last sign
+constexpr double kLearnChange =
+    0.02;                             // share of a sample in the usual change; of the first ones an equal one
+constexpr double kDoubt_s = 0.5;      // stamps are doubted so long after a gap or a step back
+constexpr double kRemember_s = 0.05;  // a fault is reported so long after its last sign
 constexpr double kLongestLead_s = 10;  // samples are taken at most so far ahead of their use
 
 double& axis(ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 3]; }
@@ -112,15 +113,17 @@ void ImuWatch::repair(Kept* now) {
       tell(raw.t, text("IMU saturated: ", kAxes[k]));
     } else {
       const double possible = kSpikeRate[sensor] * since_good_s;
-      now->off[k] = std::abs(change) > std::max({kSpikeSigma * usual, possible, kLeastSpike[sensor]});
+      now->off[k] =
+          changes_ > 0 && std::abs(change) > std::max({kSpikeSigma * usual, possible, kLeastSpike[sensor]});
       if (!now->off[k]) largest_[k] = std::max(largest_[k], magnitude);
     }
     // A spike teaches no more than the least spike would.
     const double lesson = usual > 0 ? std::min(std::abs(change), kSpikeSigma * usual) : change;
     square[sensor] += lesson * lesson / 3;
   }
+  const double share = std::max(kLearnChange, 1.0 / ++changes_);
   for (std::size_t sensor = 0; sensor < 2; ++sensor)
-    mean_square_[sensor] += kLearnChange * (square[sensor] - mean_square_[sensor]);
+    mean_square_[sensor] += share * (square[sensor] - mean_square_[sensor]);
   if (stuck == 0 || stuck == 6) return;
   tell(raw.t, text("IMU stuck: ", kAxes[static_cast<std::size_t>(stuck_at)]));
   now->checked.trust = ImuTrust::suspect;

@@ -67,6 +67,7 @@ class ImuWatch {
   std::array<int, 6> equal_{};
   std::array<double, 6> largest_{};
   std::array<double, 2> mean_square_{};  ///< of the change from sample to sample, by sensor
+  double changes_ = 0;                   ///< that have been seen: no spike is told without any
   TimeNs doubt_until_ = 0;
   std::string doubt_;  ///< why
   struct Told {

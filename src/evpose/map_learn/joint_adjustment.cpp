@@ -23,8 +23,9 @@ using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
 /// Where each unknown stands.
 struct Layout {
-  explicit Layout(const AdjustmentProblem& p) : delay(15 * static_cast<Index>(p.knots())), size(delay + 1) {}
-  Index delay, size;
+  explicit Layout(const AdjustmentProblem& p)
+      : delay(15 * static_cast<Index>(p.knots())), shared(delay + 1), size(shared + p.shared.size()) {}
+  Index delay, shared, size;
 };
 
 /// Derivative of one observation by its unknowns.
@@ -75,6 +76,8 @@ class Adjuster {
 
  private:
   Share share_of(std::size_t landmark) const;
+  void add_place_prior(std::size_t landmark, Share& s) const;
+  Eigen::Vector2d off_given(std::size_t landmark) const;
   void add_priors(Eigen::MatrixXd& H, Eigen::VectorXd& b) const;
   double residual(const Observation& o, const Eigen::Vector3d& own) const;
   LandmarkEstimate estimate(std::size_t landmark, const Eigen::MatrixXd& covariance) const;
@@ -93,6 +96,7 @@ Share Adjuster::share_of(std::size_t j) const {
   Share s;
   for (std::size_t i = first_[j]; i < first_[j + 1]; ++i)
     for (const auto& [column, value] : row_of(p_, at_, p_.observations[i]).kept) s.columns.push_back(column);
+  for (const auto& [number, by_unit] : p_.landmarks[j].shared) s.columns.push_back(at_.shared + number);
   std::sort(s.columns.begin(), s.columns.end());
   s.columns.erase(std::unique(s.columns.begin(), s.columns.end()), s.columns.end());
   const auto n = static_cast<Index>(s.columns.size());
@@ -113,14 +117,41 @@ Share Adjuster::share_of(std::size_t j) const {
     s.own += w * row.own * row.own.transpose();
     s.own_b += w * o.offset_px * row.own;
   }
+  add_place_prior(j, s);
+  s.own(2, 2) += 1 / (p_.own_delay_sigma_px * p_.own_delay_sigma_px);
+  return s;
+}
+
+/// The landmark has moved from where what it shares has put its given place.
+void Adjuster::add_place_prior(std::size_t j, Share& s) const {
   const Landmark& landmark = p_.landmarks[j];
   for (int d = 0; d < 2; ++d) {
     const double w = prior_weights_[j](d) / (landmark.sigma_m(d) * landmark.sigma_m(d));
+    double moved = landmark.moved_m(d);
+    std::vector<std::pair<Index, double>> by_shared;
+    for (const auto& [number, by_unit] : landmark.shared) {
+      const double along = landmark.directions.col(d).dot(by_unit);
+      moved -= along * p_.shared(number);
+      const auto column = std::lower_bound(s.columns.begin(), s.columns.end(), at_.shared + number);
+      by_shared.emplace_back(column - s.columns.begin(), along);
+    }
     s.own(d, d) += w;
-    s.own_b(d) -= w * landmark.moved_m(d);
+    s.own_b(d) -= w * moved;
+    for (const auto& [a, va] : by_shared) {
+      for (const auto& [c, vc] : by_shared) s.H(a, c) += w * va * vc;
+      s.b(a) += w * va * moved;
+      s.mixed(a, d) -= w * va;
+    }
   }
-  s.own(2, 2) += 1 / (p_.own_delay_sigma_px * p_.own_delay_sigma_px);
-  return s;
+}
+
+/// How far it is from where what it shares has put its given place, along its directions.
+Eigen::Vector2d Adjuster::off_given(std::size_t j) const {
+  const Landmark& landmark = p_.landmarks[j];
+  Eigen::Vector2d off = landmark.moved_m + moves_[j].head<2>();
+  for (const auto& [number, by_unit] : landmark.shared)
+    off -= (p_.shared(number) + x_(at_.shared + number)) * (landmark.directions.transpose() * by_unit);
+  return off;
 }
 
 void Adjuster::add_priors(Eigen::MatrixXd& H, Eigen::VectorXd& b) const {
@@ -138,6 +169,11 @@ void Adjuster::add_priors(Eigen::MatrixXd& H, Eigen::VectorXd& b) const {
     b.segment<30>(at) -= JW * step.offset;
   }
   H(at_.delay, at_.delay) += 1 / (p_.delay_sigma_px * p_.delay_sigma_px);
+  const Index n = p_.shared.size();
+  if (n == 0) return;
+  const Eigen::MatrixXd information = p_.shared_covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  H.bottomRightCorner(n, n) += information;
+  b.tail(n) -= information * p_.shared;
 }
 
 void Adjuster::solve() {
@@ -182,9 +218,8 @@ void Adjuster::reweight() {
     weights_[i] = robust_weight(residual(o, moves_[o.landmark]) / std::sqrt(o.scatter_px2));
   }
   for (std::size_t j = 0; j < p_.landmarks.size(); ++j) {
-    const Landmark& l = p_.landmarks[j];
-    for (int d = 0; d < 2; ++d)
-      prior_weights_[j](d) = robust_weight((l.moved_m(d) + moves_[j](d)) / l.sigma_m(d));
+    const Eigen::Vector2d off = off_given(j);
+    for (int d = 0; d < 2; ++d) prior_weights_[j](d) = robust_weight(off(d) / p_.landmarks[j].sigma_m(d));
   }
 }
 
@@ -227,6 +262,7 @@ AdjustmentResult Adjuster::result(const std::vector<Eigen::Matrix3d>& R_map_body
   }
   out.common_covariance = mean * covariance * mean.transpose();
   out.delay_px = x_(at_.delay);
+  out.shared = p_.shared + x_.tail(p_.shared.size());
   out.landmarks.resize(p_.landmarks.size());
   for (std::size_t j = 0; j < p_.landmarks.size(); ++j)
     if (first_[j] < first_[j + 1]) out.landmarks[j] = estimate(j, covariance);
@@ -238,6 +274,7 @@ AdjustmentResult Adjuster::result(const std::vector<Eigen::Matrix3d>& R_map_body
 AdjustmentResult adjust(const AdjustmentProblem& problem, const std::vector<Eigen::Matrix3d>& R_map_body,
                         int reweightings) {
   EVPOSE_CHECK(R_map_body.size() == problem.knots());
+  EVPOSE_CHECK(problem.shared_covariance.rows() == problem.shared.size());
   Adjuster adjuster(problem);
   adjuster.solve();
   for (int i = 0; i < reweightings; ++i) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "evpose/fusion/state.h"
@@ -16,6 +17,9 @@ struct Landmark {
   Eigen::Vector2d moved_m = Eigen::Vector2d::Zero();  ///< from where it was given to where it was seen
   /// Of where it was given: that of the many, since it may stand on another edge or surface altogether.
   Eigen::Vector2d sigma_m = Eigen::Vector2d::Ones();
+  /// By which unknowns that it shares with others its given place is displaced: number of the unknown, and
+  /// displacement by its unit, map frame. Its sigma is that of what is left.
+  std::vector<std::pair<Eigen::Index, Eigen::Vector3d>> shared = {};
 };
 
 /// What the events of one landmark said over a short time, at the present trajectory and place of it:
@@ -39,8 +43,8 @@ struct KnotStep {
 };
 
 /// Trajectory and landmarks of one flight. The unknowns are errors of the states at the knots (15 each),
-/// one delay of all events, and three of each landmark, which are eliminated: what is left is the size of the
-/// knots.
+/// one delay of all events, what landmarks share, and three of each landmark, which are eliminated: what is
+/// left is the size of the knots.
 struct AdjustmentProblem {
   std::vector<KnotStep> steps;  ///< one less than there are knots
   /// Of the first state, beside the recording: its error d has d + start_offset ~ N(0, start_covariance).
@@ -49,6 +53,8 @@ struct AdjustmentProblem {
   std::vector<Landmark> landmarks;
   std::vector<Observation> observations;  ///< those of a landmark together, in the order of their landmarks
   double delay_sigma_px = 0.05, own_delay_sigma_px = 0.08;
+  Eigen::VectorXd shared;             ///< what landmarks share, as known by now; their prior is zero
+  Eigen::MatrixXd shared_covariance;  ///< of that prior
 
   std::size_t knots() const { return steps.size() + 1; }
 };
@@ -65,6 +71,7 @@ struct LandmarkEstimate {
 struct AdjustmentResult {
   std::vector<Vector15d> states;  ///< errors at the knots
   double delay_px = 0;
+  Eigen::VectorXd shared;  ///< what landmarks share, as known now
   std::vector<LandmarkEstimate> landmarks;
   /// Of the mean position and mean attitude error (map frame, m and rad) of the knots: what all that was
   /// learnt has in common.

@@ -9,8 +9,9 @@
 namespace evpose::map_learn {
 namespace {
 
-/// A flight of a few knots that sees landmarks; everything drawn.
-AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t landmarks) {
+/// A flight of a few knots that sees landmarks; everything drawn. `share`: two of three landmarks stand on
+/// what others stand on.
+AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t landmarks, bool share = false) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   const auto vector = [&](double scale) {
@@ -33,6 +34,7 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
     l.directions.col(1) = tangent.cross(l.directions.col(0));
     l.moved_m = {1e-3 * normal(random), 1e-3 * normal(random)};
     l.sigma_m = {4e-3, 1e-3};
+    if (share && j % 3 != 0) l.shared = {{0, vector(1)}, {static_cast<Eigen::Index>(j % 3), vector(1)}};
     p.landmarks.push_back(l);
     for (std::size_t i = 0; i < 8; ++i) {
       Observation o;
@@ -47,16 +49,21 @@ AdjustmentProblem drawn_problem(unsigned seed, std::size_t knots, std::size_t la
       p.observations.push_back(o);
     }
   }
+  if (share) {
+    p.shared = Eigen::Vector3d(1e-3, -2e-3, 0.5e-3);
+    p.shared_covariance = 4e-6 * Eigen::Matrix3d::Identity();
+    p.shared_covariance(0, 1) = p.shared_covariance(1, 0) = 1e-6;
+  }
   return p;
 }
 
-/// Normal equations of all unknowns: knots, delay, landmarks (two across, delay).
+/// Normal equations of all unknowns: knots, delay, landmarks (two across, delay), what these share.
 struct Dense {
   explicit Dense(const AdjustmentProblem& p)
       : delay(15 * static_cast<int>(p.knots())),
         landmarks(delay + 1),
-        H(Eigen::MatrixXd::Zero(landmarks + 3 * static_cast<int>(p.landmarks.size()),
-                                landmarks + 3 * static_cast<int>(p.landmarks.size()))),
+        shared(landmarks + 3 * static_cast<int>(p.landmarks.size())),
+        H(Eigen::MatrixXd::Zero(shared + p.shared.size(), shared + p.shared.size())),
         b(Eigen::VectorXd::Zero(H.rows())) {
     const auto add = [&](const Eigen::MatrixXd& J, const Eigen::VectorXd& r, const Eigen::MatrixXd& W) {
       H += J.transpose() * W * J;
@@ -76,9 +83,22 @@ struct Dense {
           p.steps[static_cast<std::size_t>(k)].noise.inverse());
     }
     prior(delay, 0, p.delay_sigma_px);
+    Eigen::MatrixXd of_shared = Eigen::MatrixXd::Zero(p.shared.size(), H.rows());
+    of_shared.rightCols(p.shared.size()).setIdentity();
+    add(of_shared, -p.shared, p.shared_covariance.inverse());
     for (int j = 0; j < static_cast<int>(p.landmarks.size()); ++j) {
       const Landmark& l = p.landmarks[static_cast<std::size_t>(j)];
-      for (int d = 0; d < 2; ++d) prior(landmarks + 3 * j + d, -l.moved_m(d), l.sigma_m(d));
+      for (int d = 0; d < 2; ++d) {
+        Eigen::MatrixXd J = Eigen::MatrixXd::Zero(1, H.rows());
+        J(0, landmarks + 3 * j + d) = 1;
+        double off = l.moved_m(d);
+        for (const auto& [number, by_unit] : l.shared) {
+          J(0, shared + number) -= l.directions.col(d).dot(by_unit);
+          off -= l.directions.col(d).dot(by_unit) * p.shared(number);
+        }
+        add(J, Eigen::VectorXd::Constant(1, -off),
+            Eigen::MatrixXd::Constant(1, 1, 1 / (l.sigma_m(d) * l.sigma_m(d))));
+      }
       prior(landmarks + 3 * j + 2, 0, p.own_delay_sigma_px);
     }
     for (const Observation& o : p.observations) {
@@ -92,13 +112,13 @@ struct Dense {
       add(J, Eigen::VectorXd::Constant(1, o.offset_px), Eigen::MatrixXd::Constant(1, 1, 1 / o.variance_px2));
     }
   }
-  int delay, landmarks;
+  int delay, landmarks, shared;
   Eigen::MatrixXd H;
   Eigen::VectorXd b;
 };
 
 TEST(JointAdjustment, EliminationSolvesTheFullNormalEquations) {
-  const AdjustmentProblem p = drawn_problem(1, 5, 30);
+  const AdjustmentProblem p = drawn_problem(1, 5, 30, true);
   const Dense dense(p);
   const Eigen::VectorXd x = dense.H.ldlt().solve(dense.b);
   const Eigen::MatrixXd covariance = dense.H.inverse();
@@ -110,6 +130,7 @@ TEST(JointAdjustment, EliminationSolvesTheFullNormalEquations) {
               1e-12);
   }
   EXPECT_NEAR(result.delay_px, x(dense.delay), 1e-9);
+  EXPECT_LT((result.shared - p.shared - x.tail<3>()).norm(), 1e-10);
   for (int j = 0; j < 30; ++j) {
     const LandmarkEstimate& e = result.landmarks[static_cast<std::size_t>(j)];
     const int at = dense.landmarks + 3 * j;
@@ -134,6 +155,7 @@ TEST(JointAdjustment, CommonCovarianceIsThatOfTheMeanPose) {
 struct Known {
   std::vector<Vector15d> states;
   std::vector<Eigen::Vector2d> landmarks;
+  Eigen::Vector3d shared = Eigen::Vector3d::Zero();
 };
 
 /// `elsewhere`: by which every fourth landmark stands off, map frame.
@@ -151,8 +173,15 @@ Known make_consistent(AdjustmentProblem& p, unsigned seed, double noise_px,
     p.steps[k].offset = p.steps[k].transition * known.states[k] - known.states[k + 1];
   p.start_covariance.setIdentity();
   p.start_offset.setZero();
+  if (p.shared.size() > 0) {
+    p.shared.setZero();
+    p.shared_covariance = 25e-6 * Eigen::Matrix3d::Identity();
+    for (double& value : known.shared) value = 5e-3 * normal(random);
+  }
   for (Landmark& l : p.landmarks) {
     known.landmarks.emplace_back(2e-3 * normal(random), 0.5e-3 * normal(random));
+    for (const auto& [number, by_unit] : l.shared)
+      known.landmarks.back() += known.shared(number) * (l.directions.transpose() * by_unit);
     l.moved_m.setZero();
     l.sigma_m = {2e-3, 0.5e-3};
     if (known.landmarks.size() % 4 == 0) known.landmarks.back() += l.directions.transpose() * elsewhere;
@@ -184,6 +213,31 @@ TEST(JointAdjustment, ShiftedContoursAndTrajectoryComeBackWithinTheirSigma) {
   }
   EXPECT_GT(square / count, 0.8);
   EXPECT_LT(square / count, 1.2);
+}
+
+TEST(JointAdjustment, WhatLandmarksShareComesBackWithinItsSigma) {
+  double square = 0, off = 0, off_if_not_known_to_be_shared = 0;
+  constexpr unsigned kSeeds = 60;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    AdjustmentProblem p = drawn_problem(seed, 6, 60, true);
+    const Known known = make_consistent(p, 300 + seed, 0.2);
+    const std::vector<Eigen::Matrix3d> rotations(6, Eigen::Matrix3d::Identity());
+    const auto mean_off = [&known](const AdjustmentResult& result) {
+      double sum = 0;
+      for (std::size_t k = 0; k < 6; ++k) sum += (result.states[k] - known.states[k]).head<3>().norm() / 6;
+      return sum;
+    };
+    const AdjustmentResult result = adjust(p, rotations, 0);
+    const Eigen::MatrixXd covariance = Dense(p).H.inverse();
+    const Eigen::Vector3d e = result.shared - known.shared;
+    square += e.dot(covariance.bottomRightCorner<3, 3>().inverse() * e) / 3;
+    off += mean_off(result);
+    for (Landmark& l : p.landmarks) l.shared.clear();
+    off_if_not_known_to_be_shared += mean_off(adjust(p, rotations, 0));
+  }
+  EXPECT_GT(square / kSeeds, 0.7);
+  EXPECT_LT(square / kSeeds, 1.3);
+  EXPECT_LT(off, 0.5 * off_if_not_known_to_be_shared);
 }
 
 TEST(JointAdjustment, ContoursOnAnotherEdgePullTheTrajectoryOnlyWhereNothingIsDoubted) {

@@ -47,6 +47,25 @@ int import_map(const std::string& contours, const std::string& occluders, const 
   return 0;
 }
 
+/// What flights have told of it, if they have.
+void print_learnt(const ContourMap& map) {
+  std::vector<int> looks;
+  double told_m = 0;
+  for (const ContourPoint& p : map.points) {
+    if (p.looks == 0) continue;
+    looks.push_back(p.looks);
+    told_m += static_cast<double>(p.length);
+  }
+  if (looks.empty() || !map.learnt) return;
+  const auto middle = looks.begin() + static_cast<std::ptrdiff_t>(looks.size() / 2);
+  std::nth_element(looks.begin(), middle, looks.end());
+  const Eigen::Vector3d sigma_mm = 1e3 * map.learnt->covariance.diagonal().head<3>().cwiseMax(0).cwiseSqrt();
+  std::printf(
+      "flights    told %.1f m, a contour in %d twentieths of a second (median), together within %.1f, "
+      "%.1f, %.1f mm (x, y, z, 1 sigma)\n",
+      told_m, *middle, sigma_mm.x(), sigma_mm.y(), sigma_mm.z());
+}
+
 int print_map(const ContourMap& map) {
   const MapFigures f = figures_of(map);
   std::printf("points     %zu\ncontours   %zu\nlength     %.1f m\n", map.points.size(), f.contours,
@@ -57,6 +76,7 @@ int print_map(const ContourMap& map) {
                   is_view_dependent(static_cast<ContourKind>(k))
                       ? ", view-dependent: nothing is aligned to them"
                       : "");
+  print_learnt(map);
   std::printf("bounds     x %.2f .. %.2f  y %.2f .. %.2f  z %.2f .. %.2f m\n", f.low.x(), f.high.x(),
               f.low.y(), f.high.y(), f.low.z(), f.high.z());
   std::printf("occluders  %zu triangles\nframe      %s\n", map.occluders.triangles.size(), map.frame.c_str());

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,17 @@ struct ContourPoint {
   std::int32_t plane_a = -1, plane_b = -1;  ///< adjacent planes, -1: none
   ContourKind kind = ContourKind::unknown;
   std::int8_t contrast = 0;  ///< brightness step when crossing along normal: -1, 0, +1
+  std::uint16_t looks = 0;   ///< of a twentieth of a second in which flights have told its place; 65535: more
   Eigen::Vector3f normal_b = Eigen::Vector3f::Zero();  ///< as normal, in plane b; zero: none or unknown
+  /// Mean over the looks of the unit vector towards the camera, map frame: the shorter, the wider apart.
+  Eigen::Vector3f seen_from = Eigen::Vector3f::Zero();
+};
+
+/// What all that flights have told of a map has in common: it may be displaced, and turned about a point.
+struct LearntFrame {
+  Eigen::Vector3d about = Eigen::Vector3d::Zero();  ///< map frame, metres
+  /// Of displacement and turn, map frame, m and rad.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
 /// A flat surface of the map: normal . x + d = 0 with x relative to ContourMap::anchor.
@@ -88,6 +99,7 @@ struct ContourMap {
   std::vector<MapPage> pages;          ///< empty: the map is not divided
   std::vector<std::uint32_t> numbers;  ///< of the points in the map that this is a part of, ascending; empty:
                                        ///< it is a whole
+  std::optional<LearntFrame> learnt;   ///< of the points with looks; none: flights have told nothing
   std::string frame = "map";           ///< name of the map frame
   std::string board;                   ///< board_words() of the printed board that it is; empty: it is none
   std::string source;                  ///< file it was read from, for messages

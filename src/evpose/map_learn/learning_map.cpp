@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "evpose/fusion/fusion_config.h"
 
@@ -28,12 +29,23 @@ constexpr double kLargestHeight_m = 3e-3;  // of a marking over its plane, besid
 
 }  // namespace
 
-LearningMap::LearningMap(const ContourMap& given) : map_(given) {
+LearningMap::LearningMap(const ContourMap& given) : map_(given), frame_(given.learnt) {
+  if (frame_) shared_ = Eigen::VectorXd::Zero(6);
   std::int32_t next = next_contour();
   for (ContourPoint& p : map_.points) {
     if (p.contour < 0 && p.kind == ContourKind::marking) p.contour = next++;
-    records_.push_back({p.position, p.sigma, false, false, p.contrast != 0, false});
+    records_.push_back({p.position, p.sigma, false, false, p.contrast != 0, false, p.looks, p.seen_from});
   }
+}
+
+Eigen::MatrixXd LearningMap::shared_covariance() const {
+  return frame_ ? Eigen::MatrixXd(frame_->covariance) : Eigen::MatrixXd();
+}
+
+Eigen::Matrix<double, 3, 6> LearningMap::by_frame(const Eigen::Vector3d& at) const {
+  Eigen::Matrix<double, 3, 6> out;
+  out << Eigen::Matrix3d::Identity(), -so3::hat(at - frame_->about);
+  return out;
 }
 
 std::int32_t LearningMap::next_contour() const {
@@ -50,14 +62,28 @@ void LearningMap::displace(const std::vector<Eigen::Vector3d>& displacements) {
 void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
   for (const ContourPoint& p : points) {
     map_.points.push_back(p);
-    records_.push_back({p.position, p.sigma, true, false, false, false});
+    records_.push_back({p.position, p.sigma, true});
   }
+}
+
+/// One whose place an earlier flight has told: well across the contour as it was seen, less well towards the
+/// camera, and with that flight's error of the frame beside its own.
+Landmark LearningMap::told_before(const Landmark& l, const Eigen::Vector3d& at, double stated_m) const {
+  Landmark out = l;
+  const Eigen::Matrix<double, 3, 6> J = by_frame(at);
+  const Eigen::Matrix3d common = J * frame_->covariance * J.transpose();
+  const Eigen::Vector3d across = out.directions.col(0);
+  const double own_m =
+      std::sqrt(std::max(stated_m * stated_m - across.dot(common * across), kFloor_m * kFloor_m));
+  out.sigma_m = {own_m, own_m / kViewChange};
+  for (Eigen::Index k = 0; k < 6; ++k) out.shared.emplace_back(k, J.col(k));
+  return out;
 }
 
 std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) const {
   std::vector<Landmark> out(segments.count);
   std::vector<Eigen::Vector3d> moved(segments.count, Eigen::Vector3d::Zero()), tangent = moved,
-                                                                               normal = moved;
+                                                                               normal = moved, place = moved;
   std::vector<double> points(segments.count, 0), sigma(segments.count, 0);
   std::vector<const Record*> record(segments.count, nullptr);
   std::vector<const ContourPoint*> example(segments.count, nullptr);
@@ -69,6 +95,7 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
     moved[s] += (p.position - records_[i].given).cast<double>();
     tangent[s] += sign * p.tangent.cast<double>();
     normal[s] += p.normal.cast<double>();
+    place[s] += map_.anchor + records_[i].given.cast<double>();
     sigma[s] += static_cast<double>(records_[i].given_sigma);
     points[s] += 1;
   }
@@ -77,9 +104,13 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
     const Eigen::Vector3d t = tangent[s].normalized();
     Eigen::Vector3d n = normal[s] - normal[s].dot(t) * t;
     n = n.norm() > 0.1 * points[s] ? n.normalized() : t.unitOrthogonal();
+    const bool told = frame_ && record[s]->looks > 0;
+    if (told) n = t.cross(record[s]->seen_from.cast<double>()).normalized();
     l.directions << n, t.cross(n);
     const double stated = sigma[s] / points[s];
-    if (example[s]->kind == ContourKind::marking) {
+    if (told) {
+      l = told_before(l, place[s] / points[s], stated);
+    } else if (example[s]->kind == ContourKind::marking) {
       l.sigma_m = record[s]->is_new ? Eigen::Vector2d(kAlongPlane_m, kOffPlane_m)
                                     : Eigen::Vector2d(stated, stated / kViewChange);
     } else {
@@ -110,17 +141,41 @@ Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool c
 
 }  // namespace
 
-void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, std::size_t point) {
+void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, const Eigen::Vector3d& from,
+                       std::size_t point) {
   ContourPoint& p = map_.points[point];
   p.position += (l.directions * e.move_m).cast<float>();
   const double elsewhere = kViewChange * kViewChange * e.covariance.trace();
   p.sigma = static_cast<float>(std::sqrt(e.seen_variance_m2 + elsewhere + kFloor_m * kFloor_m));
-  records_[point].was_told = true;
+  Record& record = records_[point];
+  record.was_told = true;
+  constexpr int kMost = std::numeric_limits<std::uint16_t>::max();
+  const auto before = static_cast<float>(record.looks), now = static_cast<float>(e.observations);
+  p.looks = static_cast<std::uint16_t>(std::min(kMost, record.looks + e.observations));
+  p.seen_from = (before * record.seen_from + now * from.cast<float>()) / (before + now);
 }
+
+namespace {
+
+/// Of each landmark, from where it was seen: mean of unit vectors.
+std::vector<Eigen::Vector3d> mean_views(const FlightObservations& observed, std::size_t landmarks) {
+  std::vector<Eigen::Vector3d> out(landmarks, Eigen::Vector3d::Zero());
+  std::vector<double> count(landmarks, 0);
+  for (std::size_t i = 0; i < observed.observations.size(); ++i) {
+    out[observed.observations[i].landmark] += observed.views[i];
+    ++count[observed.observations[i].landmark];
+  }
+  for (std::size_t j = 0; j < landmarks; ++j) out[j] /= std::max(1.0, count[j]);
+  return out;
+}
+
+}  // namespace
 
 void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& segments,
                         const FlightObservations& observed) {
   const auto unknowns = landmarks(segments);
+  const auto views = mean_views(observed, segments.count);
+  shared_ = result.shared;
   std::vector<bool> gone(map_.points.size(), false);
   for (std::size_t i = 0; i < map_.points.size(); ++i) {
     const std::uint32_t s = segments.of_point[i];
@@ -133,10 +188,12 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     const Verdict verdict =
         vanished ? Verdict::wrong : judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
     if (verdict == Verdict::good) {
-      take(e, unknowns[s], i);
+      take(e, unknowns[s], views[s], i);
       p.contrast = observed.map.points[i].contrast;
     } else if (verdict == Verdict::untold && !record.was_told) {
       p.position = record.given;
+      if (frame_ && record.looks > 0)
+        p.position += (by_frame(map_.anchor + record.given.cast<double>()) * shared_.head<6>()).cast<float>();
     }
     gone[i] = verdict == Verdict::wrong || (record.is_new && verdict == Verdict::untold);
     if (gone[i] && !record.is_new) (vanished ? gone_m_ : struck_m_) += static_cast<double>(p.length);

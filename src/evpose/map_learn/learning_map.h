@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "evpose/map/contour_map.h"
@@ -33,8 +34,16 @@ class LearningMap {
   /// Markings whose place is as well known as the trajectory that they were seen from.
   void add_markings(const std::vector<ContourPoint>& points);
 
-  /// The contrast segments of map() as unknowns, with what was known of each before this flight.
+  /// The contrast segments of map() as unknowns, with what was known of each before this flight. What
+  /// earlier flights have told shares the error of their frame: unknowns 0 to 5 (LearntFrame).
   std::vector<Landmark> landmarks(const ContourSegments& segments) const;
+  /// That error as known by now, and the covariance that it had before this flight; empty without one.
+  const Eigen::VectorXd& shared() const { return shared_; }
+  Eigen::MatrixXd shared_covariance() const;
+  /// What all that has been told has in common from this flight on.
+  void set_frame(const Eigen::Vector3d& about, const Matrix6d& covariance) {
+    map_.learnt = {about, covariance};
+  }
   /// Moves contours; strikes those out that the events contradict, or that had
   /// events before and have none now, and markings that are not sure.
   /// `observed`: of map() as it is now, in the order of the result's landmarks.
@@ -53,11 +62,18 @@ class LearningMap {
     bool was_told = false;     ///< by events of this flight
     bool told_before = false;  ///< its contrast is known from before this flight
     bool silent = false;       ///< as last seen
+    std::uint16_t looks = 0;   ///< before this flight
+    Eigen::Vector3f seen_from = Eigen::Vector3f::Zero();
   };
-  void take(const LandmarkEstimate& e, const Landmark& l, std::size_t point);
+  /// Displacement of a place by the error of the frame, map frame.
+  Eigen::Matrix<double, 3, 6> by_frame(const Eigen::Vector3d& at) const;
+  Landmark told_before(const Landmark& l, const Eigen::Vector3d& at, double stated_m) const;
+  void take(const LandmarkEstimate& e, const Landmark& l, const Eigen::Vector3d& from, std::size_t point);
 
   ContourMap map_;
   std::vector<Record> records_;
+  std::optional<LearntFrame> frame_;  ///< of what earlier flights have told
+  Eigen::VectorXd shared_;
   double struck_m_ = 0, gone_m_ = 0;
 };
 

@@ -161,5 +161,70 @@ TEST(LearningMap, ANewMarkingIsFreeAlongItsPlaneAndOneOfAnEarlierFlightIsHeldByI
   EXPECT_NEAR(held.sigma_m(0), static_cast<double>(second.map().points[25].sigma), 1e-9);
 }
 
+/// Of a landmark seen `looks` times from one direction.
+void add_looks(FlightObservations& observed, std::uint32_t landmark, int looks, const Eigen::Vector3d& from) {
+  for (int i = 0; i < looks; ++i) {
+    Observation o;
+    o.landmark = landmark;
+    observed.observations.push_back(o);
+    observed.views.push_back(from.normalized());
+  }
+}
+
+/// Flown over once: the first rim was told, from above; the frame stands within 2 mm.
+ContourMap told_once() {
+  LearningMap map(two_rims());
+  const ContourSegments segments = cut_into_segments(map.map());
+  AdjustmentResult result = nothing_told(2);
+  result.landmarks[segments.of_point[0]] = good(1e-3);
+  FlightObservations observed = seen(map, 1);
+  add_looks(observed, segments.of_point[0], 20, {0, 0, 1});
+  map.apply(result, segments, observed);
+  map.set_frame({0, 0, 1}, 4e-6 * Matrix6d::Identity());
+  return map.map();
+}
+
+TEST(LearningMap, HowOftenAndFromWhereAContourWasSeenAddsUp) {
+  const ContourMap once = told_once();
+  EXPECT_EQ(once.points[0].looks, 20);
+  EXPECT_NEAR(once.points[0].seen_from.z(), 1, 1e-6);
+  EXPECT_EQ(once.points[10].looks, 0);
+  LearningMap second(once);
+  const ContourSegments segments = cut_into_segments(second.map());
+  AdjustmentResult result = nothing_told(2);
+  result.shared = Eigen::VectorXd::Zero(6);
+  for (const std::uint32_t s : {segments.of_point[0], segments.of_point[10]}) result.landmarks[s] = good(0);
+  FlightObservations observed = seen(second, 1);
+  for (const std::uint32_t s : {segments.of_point[0], segments.of_point[10]})
+    add_looks(observed, s, 20, {0, 1, 0});
+  // Passes of one flight count once.
+  for (int pass = 0; pass < 2; ++pass) second.apply(result, segments, observed);
+  EXPECT_EQ(second.map().points[0].looks, 40);
+  EXPECT_LT((second.map().points[0].seen_from - Eigen::Vector3f(0, 0.5F, 0.5F)).norm(), 1e-6F);
+  EXPECT_EQ(second.map().points[10].looks, 20);
+}
+
+TEST(LearningMap, WhatWasToldBeforeSharesTheErrorOfItsFrame) {
+  LearningMap second(told_once());
+  const ContourSegments segments = cut_into_segments(second.map());
+  const std::vector<Landmark> landmarks = second.landmarks(segments);
+  const Landmark &told = landmarks[segments.of_point[0]], &untold = landmarks[segments.of_point[10]];
+  EXPECT_TRUE(untold.shared.empty());
+  ASSERT_EQ(told.shared.size(), 6u);
+  EXPECT_EQ(second.shared_covariance(), Eigen::MatrixXd(4e-6 * Matrix6d::Identity()));
+  EXPECT_LT(told.sigma_m(0), 0.5e-3) << "its own; the frame's 2 mm are beside it";
+  // Turned about x by 1 mrad and displaced upwards by 3 mm: it moves though this flight does not see it.
+  AdjustmentResult result = nothing_told(2);
+  result.shared = Eigen::VectorXd::Zero(6);
+  result.shared(2) = 3e-3;
+  result.shared(3) = 1e-3;
+  const Eigen::Vector3f before = second.map().points[0].position;
+  second.apply(result, segments, seen(second, 1));
+  const Eigen::Vector3f moved = second.map().points[0].position - before;
+  const Eigen::Vector3f expected(0, 1e-3F * (1 - before.z()), 3e-3F + 1e-3F * before.y());
+  EXPECT_LT((moved - expected).norm(), 1e-7F);
+  EXPECT_EQ(second.map().points[10].position, told_once().points[10].position);
+}
+
 }  // namespace
 }  // namespace evpose::map_learn

@@ -147,8 +147,14 @@ Status FlightLearner::adjust_once() {
   problem.start_offset = trajectory_.front().minus(*start_);
   problem.landmarks = learning_.landmarks(segments);
   problem.observations = seen->observations;
+  problem.shared = learning_.shared();
+  problem.shared_covariance = learning_.shared_covariance();
   std::vector<Eigen::Matrix3d> rotations;
-  for (const std::size_t k : seen->knots) rotations.push_back(trajectory_[k].nav.T_map_body.rotation());
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const std::size_t k : seen->knots) {
+    rotations.push_back(trajectory_[k].nav.T_map_body.rotation());
+    middle += trajectory_[k].nav.T_map_body.p / static_cast<double>(seen->knots.size());
+  }
   const AdjustmentResult result = adjust(problem, rotations);
   add_at_knots(seen->knots, result.states, trajectory_);
   std::size_t knot = 0;
@@ -157,6 +163,7 @@ Status FlightLearner::adjust_once() {
     trajectory_[i].covariance.topLeftCorner<6, 6>() = result.pose_covariances[knot];
   }
   learning_.apply(result, segments, *seen);
+  learning_.set_frame(middle, result.common_covariance);
   report(result, *seen);
   return {};
 }

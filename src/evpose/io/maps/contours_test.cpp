@@ -227,6 +227,32 @@ TEST(MapH5, WrittenMapsReadBack) {
   EXPECT_EQ(complete->points.size(), map.points.size());
 }
 
+TEST(MapH5, WhatFlightsHaveToldIsKept) {
+  const TemporaryFolder folder;
+  ContourMap map = small_map();
+  ASSERT_TRUE(write_map_h5(folder / "untold.h5", map).ok());
+  map.points[0].looks = 300;
+  map.points[0].seen_from = {0.1F, -0.7F, 0.6F};
+  LearntFrame& frame = map.learnt.emplace();
+  frame.about = {1, 2, 3};
+  for (int i = 0; i < 36; ++i) frame.covariance(i / 6, i % 6) = 1e-6 * (i + 1.0) * (i % 7 == 0 ? 9 : 1);
+  ASSERT_TRUE(write_map_h5(folder / "told.h5", map).ok());
+  const auto untold = read_map_h5(folder / "untold.h5"), told = read_map_h5(folder / "told.h5");
+  ASSERT_TRUE(untold.ok() && told.ok()) << error_line(untold) << error_line(told);
+  EXPECT_FALSE(untold->learnt);
+  EXPECT_EQ(untold->points[0].looks, 0);
+  ASSERT_TRUE(told->learnt);
+  EXPECT_EQ(told->learnt->about, frame.about);
+  EXPECT_EQ(told->learnt->covariance, Matrix6d(frame.covariance.transpose()));
+  int points = 0;
+  for (const ContourPoint& p : told->points) {
+    points += p.looks > 0;
+    if (p.looks > 0) EXPECT_EQ(p.seen_from, map.points[0].seen_from);
+    if (p.looks > 0) EXPECT_EQ(p.looks, 300);
+  }
+  EXPECT_EQ(points, 1);
+}
+
 TEST(MapH5, WhereAMapLiesInTheWorldIsKept) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_map_h5(folder / "plain.h5", small_map()).ok());

@@ -50,6 +50,17 @@ Status read_map_meta(const Hdf5File& file, ContourMap& map) {
   map.anchor = {(*anchor)[0], (*anchor)[1], (*anchor)[2]};
   if (!(map.anchor.cwiseAbs().maxCoeff() <= kFarthestInMap))
     return Error{where, "the anchor is not finite or out of range", kMapDamaged};
+  const auto about = file.attribute_numbers("/meta", "learnt_about");
+  const auto covariance = file.attribute_numbers("/meta", "learnt_covariance");
+  if (about && covariance) {
+    if (about->size() != 3 || covariance->size() != 36)
+      return Error{where, "learnt_about and learnt_covariance are not 3 and 6 x 6 numbers", kMapDamaged};
+    LearntFrame& learnt = map.learnt.emplace();
+    learnt.about = Eigen::Map<const Eigen::Vector3d>(about->data());
+    learnt.covariance = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(covariance->data());
+    if (!learnt.about.allFinite() || !learnt.covariance.allFinite())
+      return Error{where, "learnt_about and learnt_covariance are not finite", kMapDamaged};
+  }
   map.frame = meta_text(file, "frame");
   map.board = meta_text(file, "board");
   return {};
@@ -79,6 +90,10 @@ Status read_points(const Hdf5File& file, MapColumns& columns, ContourMap& map) {
   const auto sigma = own_sigma ? columns.column<float>("/points/sigma", 1, rows) : std::vector<float>();
   const bool own_length = file.has("/points/length");
   const auto length = own_length ? columns.column<float>("/points/length", 1, rows) : std::vector<float>();
+  const bool learnt = file.has("/points/looks") && file.has("/points/seen_from");
+  const auto looks =
+      learnt ? columns.column<std::uint16_t>("/points/looks", 1, rows) : std::vector<std::uint16_t>();
+  const auto seen_from = learnt ? columns.column<float>("/points/seen_from", 3, rows) : std::vector<float>();
   if (!columns.status()) return columns.status();
   map.points.resize(static_cast<std::size_t>(rows));
   for (std::size_t i = 0; i < map.points.size(); ++i) {
@@ -89,6 +104,7 @@ Status read_points(const Hdf5File& file, MapColumns& columns, ContourMap& map) {
     if (has_b) p.normal_b = row3(normal_b, i);
     if (own_sigma) p.sigma = std::max(sigma[i], 0.0F);
     if (own_length) p.length = std::max(length[i], 0.0F);
+    if (learnt) p.looks = looks[i], p.seen_from = row3(seen_from, i);
   }
   return {};
 }

@@ -28,7 +28,8 @@ struct Columns {
   std::vector<std::int32_t> plane_a, plane_b;
   std::vector<float> length, sigma;
   std::vector<std::int8_t> contrast_sign;
-  std::vector<float> xyz, tangent, normal_a, normal_b, point_length, point_sigma;
+  std::vector<float> xyz, tangent, normal_a, normal_b, point_length, point_sigma, seen_from;
+  std::vector<std::uint16_t> looks;
 };
 
 /// Points of a contour together, contours in the order of their first points.
@@ -79,6 +80,8 @@ Columns columns_of(const ContourMap& map) {
     append(c.normal_b, p.normal_b);
     c.point_length.push_back(p.length);
     c.point_sigma.push_back(p.sigma);
+    c.looks.push_back(p.looks);
+    append(c.seen_from, p.seen_from);
     before = &p;
   }
   return c;
@@ -143,6 +146,7 @@ class Writer {
   }
 
   Status contours(const Columns& c);
+  Status looks(const Columns& c);
   Status planes(const std::vector<MapPlane>& planes);
   Status polygons(const std::vector<MapPolygon>& polygons);
   Status mesh(const TriangleMesh& mesh);
@@ -178,7 +182,14 @@ Status Writer::contours(const Columns& c) {
                         dataset("/points/normal_a", NumberType::f32, c.normal_a, 3),
                         dataset("/points/normal_b", NumberType::f32, c.normal_b, 3),
                         dataset("/points/length", NumberType::f32, c.point_length),
-                        dataset("/points/sigma", NumberType::f32, c.point_sigma)});
+                        dataset("/points/sigma", NumberType::f32, c.point_sigma), looks(c)});
+}
+
+/// Nothing where flights have told nothing.
+Status Writer::looks(const Columns& c) {
+  if (std::all_of(c.looks.begin(), c.looks.end(), [](std::uint16_t looks) { return looks == 0; })) return {};
+  return first_failure({dataset("/points/looks", NumberType::u16, c.looks),
+                        dataset("/points/seen_from", NumberType::f32, c.seen_from, 3)});
 }
 
 Status Writer::planes(const std::vector<MapPlane>& planes) {
@@ -288,6 +299,12 @@ Status Writer::meta(const ContourMap& map, const std::string& created_utc, const
        file_.set_attribute("/meta", "frame", map.frame),
        map.board.empty() ? Status() : file_.set_attribute("/meta", "board", map.board),
        file_.set_attribute("/meta", "anchor", NumberType::f64, {3}, map.anchor.data()),
+       map.learnt
+           ? file_.set_attribute("/meta", "learnt_about", NumberType::f64, {3}, map.learnt->about.data())
+           : Status(),
+       map.learnt ? file_.set_attribute("/meta", "learnt_covariance", NumberType::f64, {6, 6},
+                                        map.learnt->covariance.data())
+                  : Status(),
        file_.set_attribute("/meta", "T_ned_map", NumberType::f64, {4, 4}, T_ned_map.data()),
        placement.origin_llh
            ? file_.set_attribute("/meta", "origin_llh", NumberType::f64, {3}, placement.origin_llh->data())

@@ -25,6 +25,14 @@ PreparedMap::PreparedMap(std::shared_ptr<const ContourMap> given, double offset_
   if (offset_segment_m > 0) offset_segments = named_segments(*map, offset_segment_m);
 }
 
+std::vector<bool> told_by_flights(const ContourMap& map, const ContourSegments& segments) {
+  std::vector<bool> out(segments.count, false);
+  for (std::size_t i = 0; i < map.points.size(); ++i)
+    if (map.points[i].looks > 0 && map.points[i].kind != ContourKind::marking)
+      out[segments.of_point[i]] = true;
+  return out;
+}
+
 std::vector<int> contrast_of_segments(const ContourMap& map, const ContourSegments& segments) {
   std::vector<int> sum(segments.count, 0);
   for (std::size_t i = 0; i < map.points.size(); ++i) sum[segments.of_point[i]] += map.points[i].contrast;

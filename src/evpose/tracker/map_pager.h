@@ -42,6 +42,10 @@ struct NextMap {
   std::vector<int> contrast;                  ///< that the map states of each segment
 };
 
+/// Of each segment, whether flights have told its place, and it is no marking: those have other edges like
+/// them beside them.
+std::vector<bool> told_by_flights(const ContourMap& map, const ContourSegments& segments);
+
 /// The sign of contrast that most points of a segment state.
 std::vector<int> contrast_of_segments(const ContourMap& map, const ContourSegments& segments);
 

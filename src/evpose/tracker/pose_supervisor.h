@@ -64,8 +64,8 @@ class PoseSupervisor {
   }
 
   /// The map's parts are those of another place from now on; see PoseVerifier. Not while searching.
-  void rearrange(std::span<const std::uint32_t> segments_before) {
-    verifier_.rearrange(segments_before);
+  void rearrange(std::span<const std::uint32_t> segments_before, std::vector<bool> told) {
+    verifier_.rearrange(segments_before, std::move(told));
     relocalizer_.forget_map();
   }
 

@@ -40,7 +40,8 @@ class PoseSupervisorLaws : public ::testing::Test {
 
   PoseSupervisor given_pose(bool map_may_be_wrong) {
     const RelocalizerScene scene{index_, segments_, *camera_, {0, 0, -9.81}, {}, {}};
-    PoseSupervisor out({}, {}, Relocalizer(scene), PoseVerifier(camera_->size(), segments_.count, false),
+    PoseSupervisor out({}, {}, Relocalizer(scene),
+                       PoseVerifier(camera_->size(), std::vector<bool>(segments_.count), false),
                        map_may_be_wrong);
     out.start(fusion_->state(), 0);
     t_s_ = 0;

@@ -49,12 +49,13 @@ std::uint8_t sector_of(const Eigen::Vector2d& normal, std::size_t count) {
 
 }  // namespace
 
-PoseVerifier::PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides)
+PoseVerifier::PoseVerifier(ImageSize size, std::vector<bool> told, bool map_hides)
     : size_(size),
       confirmed_ratio_(map_hides ? kConfirmedRatio : kConfirmedRatioUnhidden),
       direction_ratio_(map_hides ? kDirectionRatio : kDirectionRatioUnhidden),
       pixels_(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height)),
-      pieces_(pieces) {}
+      told_(std::move(told)),
+      pieces_(told_.size()) {}
 
 void PoseVerifier::restart() {
   for (const std::uint32_t i : seen_) pieces_[i] = {};
@@ -62,7 +63,8 @@ void PoseVerifier::restart() {
   verdict_ = PoseVerdict::open;
 }
 
-void PoseVerifier::rearrange(std::span<const std::uint32_t> before) {
+void PoseVerifier::rearrange(std::span<const std::uint32_t> before, std::vector<bool> told) {
+  told_ = std::move(told);
   std::vector<std::uint32_t> now(pieces_.size(), ContrastMemory::kNew);
   std::vector<Piece> pieces(before.size());
   for (std::uint32_t i = 0; i < before.size(); ++i) {
@@ -197,20 +199,33 @@ PoseVerifier::Counts PoseVerifier::count(const Piece& piece) {
   return out;
 }
 
+/// Of a direction that counts.
+bool PoseVerifier::is_enough(const Counts& one) {
+  return one.pieces >= kFewestPiecesOfOne && one.on + one.beside >= kFewestEventsOfOne;
+}
+
 PoseEvidence PoseVerifier::evidence() const {
-  Counts all;
-  std::array<Counts, kDirections> sectors;
+  Counts all, all_told;
+  std::array<Counts, kDirections> sectors, told;
   for (const std::uint32_t i : seen_) {
-    if (pieces_[i].way_px < kLeastWay_px) continue;
-    const Counts counts = count(pieces_[i]);
-    all += counts, sectors[pieces_[i].direction] += counts;
+    const Piece& piece = pieces_[i];
+    if (piece.way_px < kLeastWay_px) continue;
+    const Counts counts = count(piece);
+    all += counts, sectors[piece.direction] += counts;
+    if (told_[i]) all_told += counts, told[piece.direction] += counts;
   }
-  if (all.pieces < kFewestPieces || all.on + all.beside < kFewestEvents) return {};
+  const auto tells = [](const Counts& c) {
+    return c.pieces >= kFewestPieces && c.on + c.beside >= kFewestEvents;
+  };
+  if (tells(all_told)) all = all_told;
+  if (!tells(all)) return {};
   PoseEvidence out{all.pieces, all.share(), all.ratio()};
   for (std::size_t i = 0; i < kDirections; ++i) {
-    Counts one = sectors[i];  // with its neighbour: no direction lies at the border of all
-    one += sectors[(i + 1) % kDirections];
-    if (one.pieces < kFewestPiecesOfOne || one.on + one.beside < kFewestEventsOfOne) continue;
+    const std::size_t next = (i + 1) % kDirections;  // with it: no direction lies at the border of all
+    Counts one = sectors[i], one_told = told[i];
+    one += sectors[next], one_told += told[next];
+    if (is_enough(one_told)) one = one_told;
+    if (!is_enough(one)) continue;
     out.contested |= one.ratio() < direction_ratio_ && one.share() < kDirectionShare;
   }
   return out;

@@ -34,17 +34,20 @@ struct PoseEvidence {
 /// those on the same contours moved aside in the image, piece by piece. A wrong pose that has been fitted to
 /// the events has some contours on edges of the image; most are where there is none. A map that is right but
 /// for what runs in one direction holds the pose in the others only, so each direction is judged by itself.
+/// Pieces that flights have told are known to make events: where they are enough, in all or in one direction,
+/// they alone are asked.
 /// Of lamps that flicker the bursts of events are left out.
 class PoseVerifier {
  public:
-  /// `pieces`: number of the map's contrast segments; `map_hides`: it has surfaces that hide contours.
-  PoseVerifier(ImageSize size, std::uint32_t pieces, bool map_hides);
+  /// `told`: of each of the map's contrast segments, whether flights have told it; `map_hides`: the map has
+  /// surfaces that hide contours.
+  PoseVerifier(ImageSize size, std::vector<bool> told, bool map_hides);
 
   /// The pose comes from elsewhere: what was seen does not count any more.
   void restart();
   /// The pieces are those of another part of the map from now on: number i was `before[i]`, or is new
   /// (ContrastMemory::kNew).
-  void rearrange(std::span<const std::uint32_t> before);
+  void rearrange(std::span<const std::uint32_t> before, std::vector<bool> told);
   /// One update of several: all events of its span, and the contours at its time; `elapsed_s`: since the
   /// last one that was looked at. `thinning`: where there are all events, out to kAside_px beside contours.
   void add(std::span<const FilteredEvent> events, std::span<const ContourSample> contours, double span_s,
@@ -74,6 +77,7 @@ class PoseVerifier {
   };
   static constexpr std::size_t kDirections = 8;
   static Counts count(const Piece& piece);
+  static bool is_enough(const Counts& one);
   void decay(double elapsed_s);
   struct Look {
     float events = 0;
@@ -93,6 +97,7 @@ class PoseVerifier {
   std::vector<std::uint8_t> pixels_;  ///< number of this update's events, kOnContour
   std::vector<std::uint32_t> patch_;  ///< pixels where a contour was, had it been moved aside
   std::vector<std::uint32_t> marked_;
+  std::vector<bool> told_;           ///< of each piece, by flights
   std::vector<Piece> pieces_;        ///< with exponential forgetting
   std::vector<std::uint32_t> seen_;  ///< pieces that something was seen of
   PoseVerdict verdict_ = PoseVerdict::open;

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <random>
 
+#include "evpose/tracker/map_pager.h"
 #include "evpose/tracker/test_flight.h"
 
 namespace evpose {
@@ -36,7 +37,7 @@ class PoseVerifierLaws : public ::testing::Test {
     std::vector<std::uint32_t> points(map.points.size());
     std::iota(points.begin(), points.end(), 0U);
     std::vector<ContourSample> samples;
-    PoseVerifier verifier(camera_->size(), segments.count, false);
+    PoseVerifier verifier(camera_->size(), told_by_flights(map, segments), false);
     for (double t_s = kLook_s; t_s < kFlight_s; t_s += kLook_s) {
       const Eigen::Vector3d rate = test_flight::imu_at(t_s).gyro;
       project_contours(view, points, {pose_at(t_s).plus(off), test_flight::velocity_at(t_s), rate}, kUpdate_s,
@@ -119,7 +120,7 @@ TEST(PoseVerifierOfFewContours, ConfirmAPoseThatWasGivenButNotOneThatWasFound) {
     contours[i].segment = static_cast<std::uint32_t>(i);
   }
   const auto looked_at = [&](int with_events) {
-    PoseVerifier verifier({640, 480}, kPieces, true);
+    PoseVerifier verifier({640, 480}, std::vector<bool>(kPieces), true);
     std::vector<FilteredEvent> events;
     for (int i = 0; i < with_events; ++i)
       for (int k = 0; k < 3; ++k) {
@@ -149,7 +150,8 @@ TEST(PoseVerifierOfFewContours, ConfirmAPoseThatWasGivenButNotOneThatWasFound) {
 TEST(PoseVerifierOfManyContours, RefuteAPoseThatHardlyOneOfThemConfirms) {
   constexpr int kColumns = 40;
   constexpr std::array<int, 4> kAside_px{-12, -7, 7, 12};
-  const auto verdict_of = [&](int pieces, int explained) {
+  constexpr int kTold = 200;
+  const auto verdict_of = [&](int pieces, int explained, int first_told = -1) {
     std::vector<ContourSample> contours(static_cast<std::size_t>(pieces));
     for (int i = 0; i < pieces; ++i) {
       contours[i].pixel = {60 + 29 * (i % kColumns), 60 + 29 * (i / kColumns)};
@@ -157,7 +159,9 @@ TEST(PoseVerifierOfManyContours, RefuteAPoseThatHardlyOneOfThemConfirms) {
       contours[i].speed_px_s = 300;
       contours[i].segment = static_cast<std::uint32_t>(i);
     }
-    PoseVerifier verifier({1280, 720}, static_cast<std::uint32_t>(pieces), true);
+    std::vector<bool> told(static_cast<std::size_t>(pieces));
+    for (int i = 0; first_told >= 0 && i < kTold; ++i) told[static_cast<std::size_t>(first_told + i)] = true;
+    PoseVerifier verifier({1280, 720}, told, true);
     for (int k = 0; k * kLook_s < kFlight_s; ++k) {
       std::vector<FilteredEvent> events;
       const auto add = [&](const ContourSample& contour, int aside_px, int count) {
@@ -170,12 +174,15 @@ TEST(PoseVerifierOfManyContours, RefuteAPoseThatHardlyOneOfThemConfirms) {
       for (int i = 0; i < explained; ++i) add(contours[i], 0, pieces / 2 / explained);
       verifier.add(events, contours, kUpdate_s, kLook_s);
     }
-    EXPECT_NEAR(verifier.evidence().ratio, 2, 0.1);
+    if (first_told < 0) EXPECT_NEAR(verifier.evidence().ratio, 2, 0.1);
     return verifier.verdict();
   };
   EXPECT_EQ(verdict_of(600, 4), PoseVerdict::refuted);
   EXPECT_EQ(verdict_of(200, 4), PoseVerdict::open);
   EXPECT_EQ(verdict_of(600, 30), PoseVerdict::open);
+  // What flights have told is asked alone, for and against the pose.
+  EXPECT_EQ(verdict_of(600, 30, 0), PoseVerdict::confirmed);
+  EXPECT_EQ(verdict_of(600, 30, 200), PoseVerdict::refuted);
 }
 
 TEST_F(PoseVerifierLaws, WithoutEventsNothingIsSaid) {

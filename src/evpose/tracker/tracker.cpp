@@ -84,7 +84,7 @@ Tracker::Tracker(const TrackerSetup& setup, const TrackerConfig& config, const S
       supervisor_(relocalization_config(config), config.health,
                   Relocalizer({map_.index, map_.segments, *setup_.camera, fusion_->propagator().gravity_map(),
                                config.visible, config.event_registration, setup_.places.get()}),
-                  PoseVerifier(setup_.camera->size(), map_.segments.count,
+                  PoseVerifier(setup_.camera->size(), told_by_flights(*setup_.map, map_.segments),
                                config.visible.occlusion && !map_.index.occluders().empty()),
                   states_errors(*setup_.map)),
       reporter_(std::move(clock)),

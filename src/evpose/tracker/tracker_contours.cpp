@@ -21,7 +21,7 @@ void Tracker::page_map() {
   contours_.renumber(next->point_now);
   registration_->rearrange_segments(next->segment_before, next->contrast);
   if (frames_) frames_->rearrange_segments(next->segment_before, next->contrast);
-  supervisor_.rearrange(next->segment_before);
+  supervisor_.rearrange(next->segment_before, told_by_flights(*map_.map, map_.segments));
 }
 
 /// The contours as the prediction has them, unless they are as the forecast had them but for a small change.

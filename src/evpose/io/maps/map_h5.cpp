@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evpose/io/maps/map_h5.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -58,8 +59,8 @@ Status read_map_meta(const Hdf5File& file, ContourMap& map) {
     LearntFrame& learnt = map.learnt.emplace();
     learnt.about = Eigen::Map<const Eigen::Vector3d>(about->data());
     learnt.covariance = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(covariance->data());
-    if (!learnt.about.allFinite() || !learnt.covariance.allFinite())
-      return Error{where, "learnt_about and learnt_covariance are not finite", kMapDamaged};
+    if (!learnt.about.allFinite() || learnt.covariance.llt().info() != Eigen::Success)
+      return Error{where, "learnt_covariance is none, or learnt_about is not finite", kMapDamaged};
   }
   map.frame = meta_text(file, "frame");
   map.board = meta_text(file, "board");

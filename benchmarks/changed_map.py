@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Maps of a scene that has changed: some contours of a map file moved, as furniture is between two flights."""
+import copy
 import shutil
 import zlib
 
 import h5py
 import numpy as np
 
+MARKING = 3  # kind
 NEAREST_M, FARTHEST_M = 0.02, 0.08  # of a move
 SAME_M, PARALLEL_COS, ALONG_M = 0.008, 0.95, 0.03  # of two pieces of contour that are one
 
@@ -17,7 +19,27 @@ class Contours:
         with h5py.File(path) as file:
             self.places, self.tangents, self.normals, self.lengths, self.sigmas = (
                 file[f"points/{name}"][:] for name in ("xyz", "tangent", "normal_a", "length", "sigma"))
-            self.contour = np.repeat(np.arange(len(file["contours/count"])), file["contours/count"][:])
+            counts = file["contours/count"][:]
+            self.contour = np.repeat(np.arange(len(counts)), counts)
+            self.kinds = np.repeat(file["contours/kind"][:], counts)
+            self.looks = file["points/looks"][:] if "points/looks" in file else np.zeros(len(self.places), int)
+
+    def part(self, which):
+        out = copy.copy(self)
+        for name, values in vars(self).items():
+            setattr(out, name, values[which])
+        return out
+
+    def told_in_place(self):
+        """Those that flights have told, but markings, which no cloud has."""
+        return (self.looks > 0) & (self.kinds != MARKING)
+
+    def across_mm(self, others, within_m):
+        """Distance across itself of each from the nearest parallel one of the others; None: there is none."""
+        partner = self.beside(others, within_m)
+        ways = others.places[partner] - self.places
+        off = np.linalg.norm(ways - (ways * self.tangents).sum(1)[:, None] * self.tangents, axis=1)
+        return [1e3 * float(d) if k >= 0 else None for k, d in zip(partner, off)]
 
     def length_m(self, which):
         return float(self.lengths[which].sum())

@@ -11,13 +11,19 @@ from changed_map import Contours, move_contours
 
 # One flight learns, others of the same place are tracked.
 LEARNS, TRACKED = "room_spiral", ["room_hover", "room_people", "room_720p"]
+# Several flights learn, one after the other.
+IN_A_ROW = [["room_spiral", "room_720p"], ["room_spiral", "room_720p", "room_people"]]
 # The first part learns, the rest is tracked: seconds of the first.
 SPLIT = {"courtyard_landing": 2.4, "room_other_view": 1.5, "room_c": 0.65, "room_e": 0.65, "courtyard_b": 0.65}
 
 
 # A changed scene: a fifth of the contours of the map that LEARNS has made are moved; then another flight learns. The
 # limits of silence were chosen with the first seed on the first flight.
+FAR_M = 0.03  # between a contour and the true one, if there is one
 CHANGED_SHARE, CHANGED = 0.2, [("room_people", 1), ("room_people", 2), ("room_720p", 3), ("room_720p", 4)]
+
+# One landing learns, the last metre of another one in the same place is tracked: 2 m/s at most.
+LANDING_PLACE, LANDING_S, LAST_S = 421, 8, 2.5
 
 # Simulated places that nobody has looked at: one flight learns, another with motion and noise of its own is tracked.
 FRESH, LEARNING_S, TRACKED_S = {"indoor_spiral": range(401, 406), "outdoor_spiral": range(406, 411)}, 10, 4
@@ -70,7 +76,33 @@ def measure_others(bench):
         learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
         tracked = {name: compare(bench, bench.peer(name).folder, bench.peer(name), scratch / "built.h5", learnt, scratch)
                    for name in TRACKED}
-    return {"told": told, "tracked": tracked}
+        places = places_of_told(bench, learnt, scratch / "built.h5", teacher.contours, scratch)
+    return {"told": told, "tracked": tracked, "places": places}
+
+
+def measure_in_a_row(bench, names):
+    """A map that flights have made better one after the other."""
+    with bench.folder() as scratch:
+        flights = [bench.peer(name) for name in names]
+        bench.run("map", "build", cloud_of(bench, flights[0]), "-o", scratch / "built.h5")
+        bench.run("map", "learn", scratch / "built.h5", *(flight.folder for flight in flights), "-o", scratch / "learnt.h5",
+                  "--init", "groundtruth", "--set", "fusion.calibration.on=false")
+        told = json.loads((scratch / "learnt.h5.json").read_text())
+        return {"common_sigma_mm": told["flights"][-1]["common_sigma_mm"],
+                "tracked": {name: track(bench, bench.peer(name).folder, bench.peer(name).truth, scratch / "learnt.h5", scratch)
+                            for name in TRACKED}}
+
+
+def measure_landings(bench):
+    with bench.folder() as scratch:
+        teacher = fresh_flight(bench, "landing", LANDING_PLACE, LANDING_PLACE, LANDING_S)
+        flight = fresh_flight(bench, "landing", LANDING_PLACE, LANDING_PLACE + 1000, LANDING_S)
+        bench.run("map", "build", teacher.folder / "map_raw.ply", "-o", scratch / "built.h5")
+        learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
+        bench.run("convert", flight.folder, scratch / "last", "--start", LANDING_S - LAST_S)
+        if not (scratch / "last/groundtruth.tum").exists():
+            shutil.copy(flight.truth, scratch / "last/groundtruth.tum")
+        return {"told": told, "tracked": compare(bench, scratch / "last", flight, scratch / "built.h5", learnt, scratch)}
 
 
 def measure_split(bench, recording, seconds):
@@ -96,7 +128,24 @@ def measure_fresh(bench, scenario, place):
     with bench.folder() as scratch:
         bench.run("map", "build", teacher.folder / "map_raw.ply", "-o", scratch / "built.h5")
         learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
-        return {"told": told, "tracked": compare(bench, flight.folder, flight, scratch / "built.h5", learnt, scratch)}
+        return {"told": told, "tracked": compare(bench, flight.folder, flight, scratch / "built.h5", learnt, scratch),
+                "places": places_of_told(bench, learnt, scratch / "built.h5", teacher.contours, scratch) if learnt else None}
+
+
+def places_of_told(bench, learnt, built, true, scratch):
+    """Of the built contours that the flight has told: distance across from the true ones, before and after, mm."""
+    bench.run("map", "import", true, "-o", scratch / "true.h5")
+    before, after, true = Contours(built), Contours(learnt), Contours(scratch / "true.h5")
+    told = after.part(after.told_in_place())
+    partner = told.beside(before, FAR_M)
+    was = before.part(partner[partner >= 0])
+    return {kind: distances(contours.across_mm(true, FAR_M)) for kind, contours in (("built", was), ("learnt", told))}
+
+
+def distances(values_mm):
+    found = sorted(v for v in values_mm if v is not None)
+    return {"mean": statistics.mean(found), "median": statistics.median(found), "p95": found[int(0.95 * len(found))],
+            "none": 1 - len(found) / len(values_mm)}
 
 
 def fresh_summary(fresh):
@@ -159,6 +208,15 @@ def told_row(name, told):
             f"{told['memory_mb']:.0f}"]
 
 
+def place_row(name, measured):
+    if not measured:
+        return [name, "refused", "-", "-"]
+    def words(m):
+        return f"{m['mean']:.2f}, {m['median']:.2f}, {m['p95']:.1f}"
+    return [name, words(measured["built"]), words(measured["learnt"]),
+            f"{100 * measured['built']['none']:.0f}, {100 * measured['learnt']['none']:.0f}"]
+
+
 def make(bench):
     others = bench.once("learn: other flights", lambda: measure_others(bench))
     recordings = {r.name: r for r in bench.peers() + bench.more_peers()}
@@ -169,14 +227,23 @@ def make(bench):
     fresh = {f"{scenario}, {place}": bench.once(f"learn: fresh {scenario} {place}",
                                                 lambda: measure_fresh(bench, scenario, place))
              for scenario, places in FRESH.items() for place in (places[:1] if bench.quick else places)}
+    in_a_row = {", ".join(names): bench.once(f"learn: {names}", lambda n=names: measure_in_a_row(bench, n)) for names in IN_A_ROW}
+    landings = bench.once("learn: landings", lambda: measure_landings(bench))
+    places = {LEARNS: others["places"], **{name: m["places"] for name, m in fresh.items()}}
     told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items())]
     heads = ["flight", "s", "views deg apart", "moved, struck, new m", "common sigma mm", "own trajectory mm, deg",
              "processor s per s", "memory MB"]
     return bench.write_page("learn", {
         "other flights": tables.transposed(others["tracked"], cell),
+        "in a row": tables.table(["learnt from", "common sigma mm", *TRACKED],
+                                 [[names, ", ".join(f"{v:.1f}" for v in m["common_sigma_mm"]),
+                                   *(cell(m["tracked"][name]) for name in TRACKED)] for names, m in in_a_row.items()]),
+        "landings": tables.transposed({"last metre of another landing": landings["tracked"]}, cell),
+        "places": tables.table(["flight", "built: mean, median, p95 mm", "learnt", "none within 3 cm, built and learnt, %"],
+                               [place_row(name, m) for name, m in places.items()]),
         "second parts": tables.transposed({name: m["tracked"] for name, m in split.items()}, cell),
         "fresh places": [*tables.transposed({name: m["tracked"] for name, m in fresh.items()}, cell),
                          "| mean | " + " | ".join(fresh_summary(fresh).values()) + " |"],
-        "flights": tables.table(heads, told + [told_row(name, m["told"]) for name, m in fresh.items()]),
+        "flights": tables.table(heads, told + [told_row("landing", landings["told"])] + [told_row(name, m["told"]) for name, m in fresh.items()]),
         "changed": tables.table(["flight", "seed", "moved m, found", "others m, struck", "as it was", "changed",
                                  "as it was, learnt", "changed, learnt"], changed)})

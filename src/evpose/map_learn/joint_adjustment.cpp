@@ -75,12 +75,12 @@ class Adjuster {
   AdjustmentResult result(const std::vector<Eigen::Matrix3d>& R_map_body) const;
 
  private:
-  Share share_of(std::size_t landmark) const;
-  void add_place_prior(std::size_t landmark, Share& s) const;
-  Eigen::Vector2d off_given(std::size_t landmark) const;
+  Share share_of(std::size_t j) const;
+  void add_place_prior(std::size_t j, Share& s) const;
+  Eigen::Vector2d off_given(std::size_t j) const;
   void add_priors(Eigen::MatrixXd& H, Eigen::VectorXd& b) const;
   double residual(const Observation& o, const Eigen::Vector3d& own) const;
-  LandmarkEstimate estimate(std::size_t landmark, const Eigen::MatrixXd& covariance) const;
+  LandmarkEstimate estimate(std::size_t j, const Eigen::MatrixXd& covariance) const;
 
   const AdjustmentProblem& p_;
   Layout at_;

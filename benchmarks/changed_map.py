@@ -19,6 +19,7 @@ class Contours:
         with h5py.File(path) as file:
             self.places, self.tangents, self.normals, self.lengths, self.sigmas = (
                 file[f"points/{name}"][:] for name in ("xyz", "tangent", "normal_a", "length", "sigma"))
+            self.places += file["meta"].attrs["anchor"].astype("f4")  # floats tell 1 um in a place of some metres
             counts = file["contours/count"][:]
             self.contour = np.repeat(np.arange(len(counts)), counts)
             self.kinds = np.repeat(file["contours/kind"][:], counts)
@@ -26,8 +27,7 @@ class Contours:
 
     def part(self, which):
         out = copy.copy(self)
-        for name, values in vars(self).items():
-            setattr(out, name, values[which])
+        vars(out).update({name: values[which] for name, values in vars(self).items()})
         return out
 
     def told_in_place(self):
@@ -91,6 +91,7 @@ def move_contours(source, target, share, seed):
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     places = given.places + (moved * step)[given.contour, None] * across[given.contour]
     with h5py.File(target, "r+") as file:
+        places = places - file["meta"].attrs["anchor"]
         file["points/xyz"][:] = places.astype("<f4")
         file["points/xyz"].attrs.modify("crc32", np.uint32(zlib.crc32(places.astype("<f4").tobytes())))
         if "pages" in file:

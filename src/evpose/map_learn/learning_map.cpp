@@ -105,7 +105,9 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
     Eigen::Vector3d n = normal[s] - normal[s].dot(t) * t;
     n = n.norm() > 0.1 * points[s] ? n.normalized() : t.unitOrthogonal();
     const bool told = frame_ && record[s]->looks > 0;
-    if (told) n = t.cross(record[s]->seen_from.cast<double>()).normalized();
+    if (const Eigen::Vector3d across = t.cross(record[s]->seen_from.cast<double>());
+        told && across.norm() > 0.1)
+      n = across.normalized();
     l.directions << n, t.cross(n);
     const double stated = sigma[s] / points[s];
     if (told) {

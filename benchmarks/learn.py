@@ -5,6 +5,8 @@ import re
 import shutil
 import statistics
 
+import numpy as np
+
 import harness
 import tables
 from changed_map import Contours, move_contours
@@ -22,8 +24,8 @@ SPLIT = {"courtyard_landing": 2.4, "room_other_view": 1.5, "room_c": 0.65, "room
 FAR_M = 0.03  # between a contour and the true one, if there is one
 CHANGED_SHARE, CHANGED = 0.2, [("room_people", 1), ("room_people", 2), ("room_720p", 3), ("room_720p", 4)]
 
-# One landing learns, the last metre of another one in the same place is tracked: 2 m/s at most.
-LANDING_PLACE, LANDING_S, LAST_S = 421, 8, 2.5
+# One landing learns; another one in the same place is tracked from a height of so much until it touches down.
+LANDING_PLACE, LANDING_S, HEIGHT_M, DOWN_M = 421, 5, 1.5, 0.01
 
 # Simulated places that nobody has looked at: one flight learns, another with motion and noise of its own is tracked.
 FRESH, LEARNING_S, TRACKED_S = {"indoor_spiral": range(401, 406), "outdoor_spiral": range(406, 411)}, 10, 4
@@ -93,13 +95,21 @@ def measure_in_a_row(bench, names):
                             for name in TRACKED}}
 
 
+def last_metres(truth):
+    """When it is HEIGHT_M, and when DOWN_M above where it ends."""
+    times, heights = np.loadtxt(truth, comments="#", usecols=(0, 3)).T
+    above = heights - heights[-1]
+    return [float(times[np.flatnonzero(above > height)[-1]] - times[0]) for height in (HEIGHT_M, DOWN_M)]
+
+
 def measure_landings(bench):
     with bench.folder() as scratch:
         teacher = fresh_flight(bench, "landing", LANDING_PLACE, LANDING_PLACE, LANDING_S)
         flight = fresh_flight(bench, "landing", LANDING_PLACE, LANDING_PLACE + 1000, LANDING_S)
         bench.run("map", "build", teacher.folder / "map_raw.ply", "-o", scratch / "built.h5")
         learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
-        bench.run("convert", flight.folder, scratch / "last", "--start", LANDING_S - LAST_S)
+        start_s, end_s = last_metres(flight.truth)
+        bench.run("convert", flight.folder, scratch / "last", "--start", start_s, "--duration", end_s - start_s)
         if not (scratch / "last/groundtruth.tum").exists():
             shutil.copy(flight.truth, scratch / "last/groundtruth.tum")
         return {"told": told, "tracked": compare(bench, scratch / "last", flight, scratch / "built.h5", learnt, scratch)}
@@ -228,7 +238,7 @@ def make(bench):
                                                 lambda: measure_fresh(bench, scenario, place))
              for scenario, places in FRESH.items() for place in (places[:1] if bench.quick else places)}
     in_a_row = {", ".join(names): bench.once(f"learn: {names}", lambda n=names: measure_in_a_row(bench, n)) for names in IN_A_ROW}
-    landings = bench.once("learn: landings", lambda: measure_landings(bench))
+    landings = bench.once("learn: last metres", lambda: measure_landings(bench))
     places = {LEARNS: others["places"], **{name: m["places"] for name, m in fresh.items()}}
     told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items())]
     heads = ["flight", "s", "views deg apart", "moved, struck, new m", "common sigma mm", "own trajectory mm, deg",
@@ -238,7 +248,7 @@ def make(bench):
         "in a row": tables.table(["learnt from", "common sigma mm", *TRACKED],
                                  [[names, ", ".join(f"{v:.1f}" for v in m["common_sigma_mm"]),
                                    *(cell(m["tracked"][name]) for name in TRACKED)] for names, m in in_a_row.items()]),
-        "landings": tables.transposed({"last metre of another landing": landings["tracked"]}, cell),
+        "landings": tables.transposed({"another landing": landings["tracked"]}, cell),
         "places": tables.table(["flight", "built: mean, median, p95 mm", "learnt", "none within 3 cm, built and learnt, %"],
                                [place_row(name, m) for name, m in places.items()]),
         "second parts": tables.transposed({name: m["tracked"] for name, m in split.items()}, cell),

@@ -247,9 +247,10 @@ TEST(MapH5, WhatFlightsHaveToldIsKept) {
   EXPECT_EQ(told->learnt->covariance, frame.covariance);
   int points = 0;
   for (const ContourPoint& p : told->points) {
-    points += p.looks > 0;
-    if (p.looks > 0) EXPECT_EQ(p.seen_from, map.points[0].seen_from);
-    if (p.looks > 0) EXPECT_EQ(p.looks, 300);
+    if (p.looks == 0) continue;
+    ++points;
+    EXPECT_EQ(p.seen_from, map.points[0].seen_from);
+    EXPECT_EQ(p.looks, 300);
   }
   EXPECT_EQ(points, 1);
   map.learnt->covariance(1, 4) = map.learnt->covariance(4, 1) = 1;

@@ -237,10 +237,12 @@ def make(bench):
     fresh = {f"{scenario}, {place}": bench.once(f"learn: fresh {scenario} {place}",
                                                 lambda: measure_fresh(bench, scenario, place))
              for scenario, places in FRESH.items() for place in (places[:1] if bench.quick else places)}
-    in_a_row = {", ".join(names): bench.once(f"learn: {names}", lambda n=names: measure_in_a_row(bench, n)) for names in IN_A_ROW}
+    in_a_row = {", ".join(names): bench.once(f"learn: {names}", lambda n=names: measure_in_a_row(bench, n))
+                for names in IN_A_ROW}
     landings = bench.once("learn: last metres", lambda: measure_landings(bench))
     places = {LEARNS: others["places"], **{name: m["places"] for name, m in fresh.items()}}
-    told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items())]
+    told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items()),
+            told_row("landing", landings["told"])]
     heads = ["flight", "s", "views deg apart", "moved, struck, new m", "common sigma mm", "own trajectory mm, deg",
              "processor s per s", "memory MB"]
     return bench.write_page("learn", {
@@ -254,6 +256,6 @@ def make(bench):
         "second parts": tables.transposed({name: m["tracked"] for name, m in split.items()}, cell),
         "fresh places": [*tables.transposed({name: m["tracked"] for name, m in fresh.items()}, cell),
                          "| mean | " + " | ".join(fresh_summary(fresh).values()) + " |"],
-        "flights": tables.table(heads, told + [told_row("landing", landings["told"])] + [told_row(name, m["told"]) for name, m in fresh.items()]),
+        "flights": tables.table(heads, [*told, *(told_row(name, m["told"]) for name, m in fresh.items())]),
         "changed": tables.table(["flight", "seed", "moved m, found", "others m, struck", "as it was", "changed",
                                  "as it was, learnt", "changed, learnt"], changed)})

@@ -24,10 +24,9 @@ constexpr double kSpikeSigma = 8;
 constexpr double kSpikeRate[] = {300, 5e3};  // rad/s^2, m/s^3
 constexpr double kLeastSpike[] = {0.3, 5};   // rad/s, m/s^2
 constexpr int kSpikeSamples = 3;
-constexpr double kLearnChange =
-    0.02;                             // share of a sample in the usual change; of the first ones an equal one
-constexpr double kDoubt_s = 0.5;      // stamps are doubted so long after a gap or a step back
-constexpr double kRemember_s = 0.05;  // a fault is reported so long after its last sign
+constexpr double kLearnChange = 0.02;  // share of a sample in the usual change; the first 50 count alike
+constexpr double kDoubt_s = 0.5;       // stamps are doubted so long after a gap or a step back
+constexpr double kRemember_s = 0.05;   // a fault is reported so long after its last sign
 constexpr double kLongestLead_s = 10;  // samples are taken at most so far ahead of their use
 
 double& axis(ImuSample& s, int i) { return i < 3 ? s.gyro[i] : s.accel[i - 3]; }

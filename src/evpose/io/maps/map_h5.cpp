@@ -60,7 +60,8 @@ Status read_map_meta(const Hdf5File& file, ContourMap& map) {
     learnt.about = Eigen::Map<const Eigen::Vector3d>(about->data());
     learnt.covariance = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(covariance->data());
     if (!learnt.about.allFinite() || learnt.covariance.llt().info() != Eigen::Success)
-      return Error{where, "learnt_covariance is none, or learnt_about is not finite", kMapDamaged};
+      return Error{where, "learnt_covariance is not positive definite, or learnt_about not finite",
+                   kMapDamaged};
   }
   map.frame = meta_text(file, "frame");
   map.board = meta_text(file, "board");

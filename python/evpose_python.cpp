@@ -194,6 +194,8 @@ PYBIND11_MODULE(evpose, m) {
             return out;
           },
           "while ambiguous: 4x4 values that T_map_body may have, likeliest first")
+      .def_readonly("probability", &Update::probability,
+                    "that the pose is the right one, not one that happens to agree with events")
       .def_readonly("points", &Update::points, "chosen map points")
       .def_readonly("points_matched", &Update::points_matched, "of these, with events near by");
   py::class_<PyTracker>(

@@ -120,6 +120,7 @@ void add_relocalization(CLI::App& bench, Run& run) {
   command->add_option("--within", request->within_s, "how long each start is watched, s")
       ->check(CLI::Range(0.1, 10.0));
   command->add_flag("!--no-imu", request->imu, "leave the IMU out");
+  command->add_option("--looks", request->looks, "CSV file for what each update says of its pose");
   command->add_option("--map", request->selection.map, "of all of them, in place of their true contours");
   command->callback(
       [=, &run] { run = [=] { return exit_status(experiments::print_relocalization(*request)); }; });

@@ -48,6 +48,9 @@ class Update:
     def candidates(self) -> list[NDArray[np.float64]]:
         """while ambiguous: 4x4 values that T_map_body may have, likeliest first"""
     @property
+    def probability(self) -> float:
+        """that the pose is the right one, not one that happens to agree with events"""
+    @property
     def points(self) -> int:
         """chosen map points"""
     @property

@@ -37,6 +37,11 @@ std::shared_ptr<const PlaceIndex> PlaceCache::over(const ContourIndex& index, co
 
 PlaceCache::PlaceCache(PlaceTable kept) : kept_(std::move(kept)) {}
 
+PlaceCache::PlaceCache(const PlaceCache& other) : kept_(other.kept_) {
+  const std::lock_guard lock(other.mutex_);
+  entries_ = other.entries_;
+}
+
 /// Whether what is kept is of this map and view, over the box and as finely.
 bool PlaceCache::keeps(std::uint64_t map, const VisibleSetConfig& config,
                        const Eigen::AlignedBox3d& box) const {

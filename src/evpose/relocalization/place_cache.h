@@ -19,6 +19,9 @@ class PlaceCache {
   PlaceCache() = default;
   /// With what a map file keeps, from which its index is made in a tenth of the time.
   explicit PlaceCache(PlaceTable kept);
+  /// With the indices that the other has now.
+  PlaceCache(const PlaceCache& other);
+  PlaceCache& operator=(const PlaceCache&) = delete;
 
   /// Of places over the box at least, divided at least nearly as finely as its own would be.
   std::shared_ptr<const PlaceIndex> over(const ContourIndex& index, const VisibleSetConfig& config,
@@ -34,7 +37,7 @@ class PlaceCache {
   bool keeps(std::uint64_t map, const VisibleSetConfig& config, const Eigen::AlignedBox3d& box) const;
 
   std::optional<PlaceTable> kept_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::deque<Entry> entries_;
 };
 

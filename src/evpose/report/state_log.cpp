@@ -84,7 +84,8 @@ void StateLog::add(const Update& u) {
 
 std::string states_csv_header() {
   return kStateColumns + covariance_columns() +
-         ",health,accepted,events_read,events_kept,points,points_matched,residual,innovation,reason\n";
+         ",health,accepted,events_read,events_kept,points,points_matched,residual,innovation,probability,"
+         "reason\n";
 }
 
 std::string states_csv_row(const Update& u) {
@@ -100,6 +101,7 @@ std::string states_csv_row(const Update& u) {
   row += counts;
   append(&row, u.residual);
   append(&row, u.innovation);
+  append(&row, u.probability);
   row += ',';
   if (!u.reason.empty()) row += quoted(u.reason);
   row += '\n';

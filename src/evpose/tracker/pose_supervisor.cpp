@@ -24,6 +24,7 @@ constexpr double kFoundFades_s = 0.5;  // while events confirm it, in a map that
 constexpr double kSlides_m_s = 0.3, kSlides_rad_s = 0.1;
 constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
+constexpr const char* kImprobable = "wrong poses look as the contours and events do now";
 constexpr const char* kOneDirection =
     "not in this map, or far from the pose: contours of one direction lie where no events are";
 
@@ -44,6 +45,7 @@ std::string words_of(const std::vector<Pose>& candidates) {
 
 void PoseSupervisor::start(const FusionState& first, double sigma_px) {
   health_.start(first.t);
+  probability_.given();
   before_search_ = first;
   start_is_unsure_ = sigma_px > Relocalizer::kSearchAboveSigma_px;
   if (config_.on && start_is_unsure_) relocalizer_.begin_search(first.t, first.nav, first.pose_covariance());
@@ -69,7 +71,8 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   set_sigma(error_state::kV, Relocalizer::kFoundVelocitySigma_m_s);
   verify_until_ = input.t + from_seconds(Relocalizer::kVerify_s);
   verifier_.restart();
-  verified_ = false;
+  verified_ = believed_ = false;
+  probability_.found();
   found_doubt_ = map_may_be_wrong_ ? 0 : 1;
   confirmed_s_ = contradicted_s_ = 0;
   return state;
@@ -94,6 +97,15 @@ void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   if (verdict == PoseVerdict::confirmed || given_agrees) contradicted_s_ = 0;
   if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
   verified_ |= confirmed_s_ > (verifying() ? kFoundConfirmed_s : kConfirmed_s);
+}
+
+void PoseSupervisor::weigh(const UpdateEvidence& e) {
+  if (searching()) return;
+  if (e.frames_confirm)
+    probability_.confirm();
+  else if (e.refused.empty())
+    probability_.add(look(), e.registration.gate_concentration, e.span_s);
+  believed_ |= verified_ && probability_.is_believed();
 }
 
 bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }
@@ -194,6 +206,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   const PoseUncertainty uncertainty(state, e.view);
   take_verdict(e.span_s, e.refused.empty());
   verified_ |= e.frames_confirm && !searching();
+  weigh(e);
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
   Evidence evidence;
   evidence.t = e.t;
@@ -207,8 +220,9 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   if (evidence.sigma_px > health_config_.degraded_sigma_px)
     evidence.weakest = uncertainty.weakest_direction();
   evidence.fault = e.fault;
-  evidence.verified = verified_;
+  evidence.verified = believed_;
   evidence.hopeless = is_hopeless();
+  if (believed_ && !probability_.is_believed()) evidence.contradicted = kImprobable;
   if (is_contested()) evidence.contradicted = kOneDirection;
   if (is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
   const Health health = health_.judge(evidence, reason);

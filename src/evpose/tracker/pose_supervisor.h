@@ -9,6 +9,7 @@
 #include "evpose/registration/registration.h"
 #include "evpose/tracker/health.h"
 #include "evpose/tracker/held_covariance.h"
+#include "evpose/tracker/pose_probability.h"
 #include "evpose/tracker/pose_uncertainty.h"
 #include "evpose/tracker/pose_verifier.h"
 #include "evpose/tracker/relocalizer.h"
@@ -78,6 +79,10 @@ class PoseSupervisor {
   std::vector<Pose> candidates() const {
     return searching() ? relocalizer_.candidates() : std::vector<Pose>{};
   }
+  /// That the pose is the right one, after judge().
+  double probability() const { return searching() ? 0 : probability_.value(); }
+  /// What the events since about a tenth of a second say of it.
+  const PoseEvidence& look() const { return verifier_.evidence(); }
   /// At first the estimate is that of the start, not yet that of the contours.
   bool initialised() const {
     return health_.state() != Health::waiting && health_.state() != Health::initialising;
@@ -95,6 +100,7 @@ class PoseSupervisor {
   bool found_pose_is_refuted(TimeNs t, const RegistrationResult& registration) const;
   bool pose_is_unconfirmed(TimeNs t, const RegistrationResult& registration) const;
   void take_verdict(double span_s, bool accepted);
+  void weigh(const UpdateEvidence& e);
   bool is_contradicted() const;
   bool is_contested() const;
   bool is_hopeless() const;
@@ -109,6 +115,7 @@ class PoseSupervisor {
   HealthConfig health_config_;
   Relocalizer relocalizer_;
   PoseVerifier verifier_;
+  PoseProbability probability_;
   HealthMonitor health_;
   HeldCovariance held_;
   FusionState before_search_;
@@ -121,6 +128,7 @@ class PoseSupervisor {
   double found_doubt_ = 0;     ///< of a pose that was found, from 1 on; 0: it was given
   bool start_is_unsure_ = false;
   bool verified_ = false;  ///< the events have confirmed the pose since it was given or found
+  bool believed_ = false;  ///< so it was, and probable enough, at some time since then
 };
 
 }  // namespace evpose

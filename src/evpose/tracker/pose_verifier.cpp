@@ -60,6 +60,7 @@ PoseVerifier::PoseVerifier(ImageSize size, std::vector<bool> told, bool map_hide
 void PoseVerifier::restart() {
   for (const std::uint32_t i : seen_) pieces_[i] = {};
   seen_.clear();
+  evidence_ = {};
   verdict_ = PoseVerdict::open;
 }
 
@@ -75,7 +76,7 @@ void PoseVerifier::rearrange(std::span<const std::uint32_t> before, std::vector<
   pieces_ = std::move(pieces);
   for (std::uint32_t& piece : seen_) piece = now[piece];
   std::erase(seen_, ContrastMemory::kNew);
-  verdict_ = judge();
+  judge();
 }
 
 /// The pixels where the contour was since the last update, had it been moved aside, into patch_. False: it
@@ -158,7 +159,7 @@ void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const Co
   decay(elapsed_s);
   const std::span<const FilteredEvent> quiet = bursts_.quiet(events);
   if (quiet.empty() && !events.empty()) {
-    verdict_ = judge();
+    judge();
     return;
   }
   const auto pixel_of = [this](const FilteredEvent& e) -> std::uint8_t& {
@@ -176,7 +177,7 @@ void PoseVerifier::add(std::span<const FilteredEvent> events, std::span<const Co
     if (thinning.takes(contour.pixel)) look_at(contour, span_s);
   for (const std::uint32_t i : marked_) pixels_[i] = 0;
   for (const FilteredEvent& e : quiet) pixel_of(e) = 0;
-  verdict_ = judge();
+  judge();
 }
 
 PoseVerifier::Counts& PoseVerifier::Counts::operator+=(const Counts& other) {
@@ -204,7 +205,7 @@ bool PoseVerifier::is_enough(const Counts& one) {
   return one.pieces >= kFewestPiecesOfOne && one.on + one.beside >= kFewestEventsOfOne;
 }
 
-PoseEvidence PoseVerifier::evidence() const {
+PoseEvidence PoseVerifier::gather() const {
   Counts all, all_told;
   std::array<Counts, kDirections> sectors, told;
   for (const std::uint32_t i : seen_) {
@@ -220,19 +221,26 @@ PoseEvidence PoseVerifier::evidence() const {
   if (tells(all_told)) all = all_told;
   if (!tells(all)) return {};
   PoseEvidence out{all.pieces, all.share(), all.ratio()};
+  std::optional<double> worst;
   for (std::size_t i = 0; i < kDirections; ++i) {
     const std::size_t next = (i + 1) % kDirections;  // with it: no direction lies at the border of all
     Counts one = sectors[i], one_told = told[i];
     one += sectors[next], one_told += told[next];
     if (is_enough(one_told)) one = one_told;
     if (!is_enough(one)) continue;
+    worst = std::min(worst.value_or(one.ratio()), one.ratio());
     out.contested |= one.ratio() < direction_ratio_ && one.share() < kDirectionShare;
   }
+  out.worst_ratio = worst.value_or(out.ratio);
   return out;
 }
 
-PoseVerdict PoseVerifier::judge() const {
-  const PoseEvidence e = evidence();
+void PoseVerifier::judge() {
+  evidence_ = gather();
+  verdict_ = weigh(evidence_);
+}
+
+PoseVerdict PoseVerifier::weigh(const PoseEvidence& e) const {
   if (e.pieces == 0) return PoseVerdict::open;
   const double explained = e.explained * e.pieces;
   const bool agrees =
@@ -248,8 +256,7 @@ PoseVerdict PoseVerifier::judge() const {
 
 PoseVerdict PoseVerifier::verdict_of_found() const {
   if (verdict_ != PoseVerdict::confirmed) return verdict_;
-  const PoseEvidence e = evidence();
-  return e.explained * e.pieces < kFewestExplained ? PoseVerdict::open : verdict_;
+  return evidence_.explained * evidence_.pieces < kFewestExplained ? PoseVerdict::open : verdict_;
 }
 
 }  // namespace evpose

@@ -12,6 +12,7 @@
 #include "evpose/registration/block_thinning.h"
 #include "evpose/registration/contour_view.h"
 #include "evpose/tracker/event_bursts.h"
+#include "evpose/tracker/pose_evidence.h"
 
 namespace evpose {
 
@@ -20,14 +21,6 @@ enum class PoseVerdict : std::uint8_t {
   confirmed,  ///< the events gather at the contours far beyond chance
   contested,  ///< they do, but for the contours of one direction in the image
   refuted,    ///< hardly more than chance and fitting put there
-};
-
-/// What the last tenth of a second says of a pose.
-struct PoseEvidence {
-  double pieces = 0;     ///< of contours, that have moved enough to show themselves
-  double explained = 0;  ///< share of these with clearly more events on them than beside, less that by chance
-  double ratio = 0;      ///< events on contours to those beside them
-  bool contested = false;  ///< contours of one direction in the image have hardly more than beside them
 };
 
 /// Tells a pose that the events confirm from one that only looks so: compares the events on the contours with
@@ -54,7 +47,7 @@ class PoseVerifier {
            double elapsed_s, const BlockThinning& thinning = {});
   static constexpr double kAside_px = 14;
 
-  PoseEvidence evidence() const;
+  const PoseEvidence& evidence() const { return evidence_; }
   PoseVerdict verdict() const { return verdict_; }
   /// The same of a pose that was chosen among many because contours agree: a few do wherever it is.
   PoseVerdict verdict_of_found() const;
@@ -86,7 +79,9 @@ class PoseVerifier {
   std::optional<Look> look(const ContourSample& contour, double aside_px, double span_s);
   void look_at(const ContourSample& contour, double span_s);
   bool find_patch(const ContourSample& contour, double aside_px, double span_s);
-  PoseVerdict judge() const;
+  PoseEvidence gather() const;
+  void judge();
+  PoseVerdict weigh(const PoseEvidence& e) const;
 
   static constexpr std::uint8_t kOnContour = 0x80, kMostEvents = 0x7F;
 
@@ -100,6 +95,7 @@ class PoseVerifier {
   std::vector<bool> told_;           ///< of each piece, by flights
   std::vector<Piece> pieces_;        ///< with exponential forgetting
   std::vector<std::uint32_t> seen_;  ///< pieces that something was seen of
+  PoseEvidence evidence_;            ///< of seen_
   PoseVerdict verdict_ = PoseVerdict::open;
 };
 

@@ -329,6 +329,7 @@ void Tracker::judge(TimeNs t, double span_s, const RegistrationResult& measureme
   const Health health = supervisor_.judge(evidence, *fusion_, &reason);
   reporter_.add_judgement(health, std::move(reason), supervisor_.candidates(),
                           supervisor_.told_covariance(reported, evidence));
+  reporter_.add_probability(supervisor_.probability(), supervisor_.look());
 }
 
 /// What is wrong with the data, in words; empty if nothing is.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "evpose/core/pose.h"
+#include "evpose/tracker/pose_evidence.h"
 
 namespace evpose {
 
@@ -43,8 +44,11 @@ struct Update {
   Matrix6d covariance = Matrix6d::Zero();  ///< of T_map_body: (translation, rotation), m^2, rad^2
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< map frame, m^2/s^2
   Health health = Health::waiting;
-  std::string reason;               ///< of the health, in words; set when it changed, else empty
-  std::vector<Pose> candidates;     ///< while ambiguous: values that T_map_body may have, likeliest first
+  std::string reason;            ///< of the health, in words; set when it changed, else empty
+  std::vector<Pose> candidates;  ///< while ambiguous: values that T_map_body may have, likeliest first
+  double probability = 0;  ///< that the pose is the right one, not one that happens to agree with events
+  PoseEvidence look;       ///< which tells that, with the next one
+  double gate_concentration = 0;    ///< of the events about the contours: 0 if they lie evenly, 1 in one line
   bool accepted = false;            ///< the registration passed the innovation gate and was used
   std::int32_t events_read = 0;     ///< since the last update
   std::int32_t events_shed = 0;     ///< of these, left out because too many came (events.most_mev_s)

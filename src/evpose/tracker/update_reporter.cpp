@@ -25,6 +25,7 @@ void UpdateReporter::add_registration(const RegistrationResult& r, double innova
   update_.accepted = accepted;
   update_.points = r.points;
   update_.points_matched = r.inliers;
+  update_.gate_concentration = r.gate_concentration;
   update_.residual = r.residual;
   update_.events_matched = r.events;
   update_.wrong_polarity = r.wrong_polarity;
@@ -37,6 +38,11 @@ void UpdateReporter::add_judgement(Health health, std::string reason, std::vecto
   update_.reason = std::move(reason);
   update_.candidates = std::move(candidates);
   update_.covariance = covariance;
+}
+
+void UpdateReporter::add_probability(double probability, const PoseEvidence& look) {
+  update_.probability = probability;
+  update_.look = look;
 }
 
 Update UpdateReporter::finish(const FusionState& state, const EventPreprocessor::Counts& counts) {

@@ -29,6 +29,7 @@ class UpdateReporter {
   /// The pose's covariance as it was judged.
   void add_judgement(Health health, std::string reason, std::vector<Pose> candidates,
                      const Matrix6d& covariance);
+  void add_probability(double probability, const PoseEvidence& look);
   /// The state at the end of the update, and the counts of events until now.
   Update finish(const FusionState& state, const EventPreprocessor::Counts& counts);
 

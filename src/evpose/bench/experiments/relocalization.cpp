@@ -7,8 +7,12 @@
 #include <cstdio>
 #include <ctime>
 #include <random>
+#include <utility>
 
+#include "evpose/bench/experiments/start_looks.h"
 #include "evpose/core/parallel.h"
+#include "evpose/io/files/atomic_file.h"
+#include "evpose/relocalization/place_index.h"
 
 namespace evpose::experiments {
 namespace {
@@ -36,12 +40,13 @@ struct StartOutcome {
   double error_mm = 0, found_after_s = -1;
   double beyond_mm = 0;  ///< largest error called tracking and beyond three of its sigmas in an axis
   double search_s = 0;   ///< of the processor
+  std::string looks;
 };
 
 /// What no pose can be found in, or none near the start.
-enum class Wrong : std::uint8_t { another_place, mirrored, start_3_m_off, noise };
-constexpr std::array<const char*, 4> kWrongNames{"map of another place", "mirrored map", "start 3 m off",
-                                                 "white noise for events"};
+enum class Wrong : std::uint8_t { another_place, mirrored, start_3_m_off, noise, nothing };
+constexpr std::array<const char*, 5> kWrongNames{"map of another place", "mirrored map", "start 3 m off",
+                                                 "white noise for events", "nothing"};
 constexpr double kBeyond_sigmas = 3;
 constexpr double kWatched_s = 1.5;
 constexpr double kFarStart_m = 3;
@@ -51,6 +56,7 @@ struct WrongOutcome {
   int beyond = 0;    ///< with a pose further off than three of its sigmas in an axis
   int tracking = 0;  ///< of these, called so
   Health at_end = Health::waiting;
+  std::string looks;
 };
 
 /// Time of this thread's processor.
@@ -121,20 +127,39 @@ bool is_beyond(const Update& u, const std::vector<TimedPose>& truth) {
   return (e.cwiseAbs().array() > kBeyond_sigmas * sigma.array()).any();
 }
 
-StartOutcome start(const Streams& streams, const StartClass& from, double within_s, unsigned seed) {
+/// As with a map that `evpose map index` made: what is seen from where is not looked at anew in each start.
+struct IndexedStreams {
+  std::string name;
+  const Streams& streams;
+  PlaceCache places;  ///< each start has its own copy: the order of starts does not matter
+};
+
+IndexedStreams indexed(const std::string& name, const Streams& streams) {
+  IndexedStreams out{name, streams, {}};
+  const ContourIndex contours(*streams.job.setup.map);
+  out.places.over(contours, streams.job.config.tracker.visible, space_around(contours.map()));
+  return out;
+}
+
+StartOutcome start(const IndexedStreams& all, const StartClass& from, double within_s, unsigned seed) {
+  const Streams& streams = all.streams;
   std::mt19937 random(seed);
   const std::vector<TimedPose>& truth = streams.job.truth;
   const TimeNs begin = random_begin(truth, within_s, random);
   const TimeNs end = begin + from_seconds(within_s + 0.01);
   const auto [packets, imu] = excerpt(streams, begin, end);
   const StartState state = wrong_start(truth, begin, from, middle_of(*streams.job.setup.map), random);
+  TrackerSetup setup = streams.job.setup;
+  setup.places = std::make_shared<PlaceCache>(all.places);
   StartOutcome out;
-  auto tracker = Tracker::create(streams.job.setup, unsure_of_start(streams.job.config.tracker, from), state,
-                                 processor_s);
+  StartLooks looks({all.name, from.name, seed}, begin, truth);
+  auto tracker =
+      Tracker::create(setup, unsure_of_start(streams.job.config.tracker, from), state, processor_s);
   if (!tracker) return out;
   (*tracker)->on_update([&](const Update& u) {
     if (u.t > begin + from_seconds(within_s)) return;
     out.health = u.health;
+    looks.add(u);
     if (u.points == 0) out.search_s += u.times.predict_s;
     const bool tracking = u.health == Health::tracking || u.health == Health::degraded;
     out.error_mm = 1e3 * u.T_map_body.minus(start_at(truth, u.t).T_map_body).head<3>().norm();
@@ -146,10 +171,11 @@ StartOutcome start(const Streams& streams, const StartClass& from, double within
   });
   feed(packets, imu, **tracker);
   (*tracker)->events_complete_until(end);
+  out.looks = looks.rows();
   return out;
 }
 
-std::vector<StartOutcome> start_all(const Streams& streams, const StartClass& from,
+std::vector<StartOutcome> start_all(const IndexedStreams& streams, const StartClass& from,
                                     const RelocalizationRequest& request) {
   std::vector<StartOutcome> outcomes(static_cast<std::size_t>(request.seeds));
   ThreadPool pool(request.threads);
@@ -206,8 +232,8 @@ ContourMap mirrored(ContourMap map) {
 }
 
 /// A start from the truth, with what makes it wrong.
-WrongOutcome start_wrong(const Streams& streams, Wrong wrong, std::shared_ptr<const ContourMap> map,
-                         unsigned seed) {
+WrongOutcome start_wrong(const std::string& name, const Streams& streams, Wrong wrong,
+                         std::shared_ptr<const ContourMap> map, unsigned seed) {
   std::mt19937 random(seed);
   const std::vector<TimedPose>& truth = streams.job.truth;
   const TimeNs begin = random_begin(truth, kWatched_s, random);
@@ -225,8 +251,10 @@ WrongOutcome start_wrong(const Streams& streams, Wrong wrong, std::shared_ptr<co
   WrongOutcome out;
   auto tracker = Tracker::create(setup, streams.job.config.tracker, state);
   if (!tracker) return out;
+  StartLooks looks({name, kWrongNames[static_cast<std::size_t>(wrong)], seed}, begin, truth);
   (*tracker)->on_update([&](const Update& u) {
     ++out.updates;
+    looks.add(u);
     out.at_end = u.health;
     // From a start that is off, the right pose may be found; and what is in view may be symmetric.
     if (!has_pose(u.health) || !is_beyond(u, truth)) return;
@@ -235,6 +263,7 @@ WrongOutcome start_wrong(const Streams& streams, Wrong wrong, std::shared_ptr<co
   });
   feed(packets, imu, **tracker);
   (*tracker)->events_complete_until(end);
+  out.looks = looks.rows();
   return out;
 }
 
@@ -250,14 +279,15 @@ std::shared_ptr<const ContourMap> wrong_map(Wrong wrong, const Streams& streams,
 }
 
 void print_wrong(const std::string& name, const Streams& streams, const std::vector<Streams>& all,
-                 const RelocalizationRequest& request) {
-  for (const Wrong wrong : {Wrong::another_place, Wrong::mirrored, Wrong::start_3_m_off, Wrong::noise}) {
+                 const RelocalizationRequest& request, std::string* looks) {
+  for (const Wrong wrong :
+       {Wrong::another_place, Wrong::mirrored, Wrong::start_3_m_off, Wrong::noise, Wrong::nothing}) {
     const std::shared_ptr<const ContourMap> map = wrong_map(wrong, streams, all);
     if (wrong == Wrong::another_place && !map) continue;
     std::vector<WrongOutcome> outcomes(static_cast<std::size_t>(request.seeds));
     ThreadPool pool(request.threads);
     pool.for_chunks(outcomes.size(), 1, [&](std::size_t, std::size_t i, std::size_t) {
-      outcomes[i] = start_wrong(streams, wrong, map, static_cast<unsigned>(1 + i));
+      outcomes[i] = start_wrong(name, streams, wrong, map, static_cast<unsigned>(1 + i));
     });
     int tracking = 0, lost = 0;
     double updates = 0, called = 0, beyond = 0;
@@ -265,12 +295,24 @@ void print_wrong(const std::string& name, const Streams& streams, const std::vec
       tracking += o.tracking > 0 ? 1 : 0;
       lost += o.at_end == Health::lost ? 1 : 0;
       updates += o.updates, called += o.tracking, beyond += o.beyond;
+      *looks += o.looks;
     }
     std::printf("| %s | %s | %d | %.1f | %.1f | %d |\n", name.c_str(),
                 kWrongNames[static_cast<std::size_t>(wrong)], tracking, 100 * called / std::max(1.0, updates),
                 100 * beyond / std::max(1.0, updates), lost);
     std::fflush(stdout);
   }
+}
+
+void print_all_wrong(const std::vector<BenchRecording>& recordings, const std::vector<Streams>& all,
+                     const RelocalizationRequest& request, std::string* looks) {
+  std::printf(
+      "\n%d starts each from the true pose, watched for %.1f s, with what cannot be tracked. Beyond: an "
+      "error of more than 3 sigma in an axis.\n\n"
+      "| recording | what is wrong | starts ever called tracking, and beyond | %% of updates called so | "
+      "%% of updates with a pose beyond | starts lost at the end |\n|---|---|---|---|---|---|\n",
+      request.seeds, kWatched_s);
+  for (std::size_t i = 0; i < all.size(); ++i) print_wrong(recordings[i].name, all[i], all, request, looks);
 }
 
 constexpr char kWrong[] = "wrong";  // among the classes: what cannot be tracked
@@ -280,9 +322,15 @@ bool is_wanted(const std::string& what, const RelocalizationRequest& request) {
   return request.classes.empty() || std::any_of(request.classes.begin(), request.classes.end(), begins);
 }
 
-void print_starts(const std::string& name, const Streams& streams, const RelocalizationRequest& request) {
+void print_starts(const std::string& name, const Streams& streams, const RelocalizationRequest& request,
+                  std::string* looks) {
+  const IndexedStreams with_places = indexed(name, streams);
   for (const StartClass& from : kClasses)
-    if (is_wanted(from.name, request)) print_row(name, from, start_all(streams, from, request));
+    if (is_wanted(from.name, request)) {
+      const std::vector<StartOutcome> outcomes = start_all(with_places, from, request);
+      print_row(name, from, outcomes);
+      for (const StartOutcome& o : outcomes) *looks += o.looks;
+    }
 }
 
 }  // namespace
@@ -311,16 +359,10 @@ Status print_relocalization(const RelocalizationRequest& request) {
         "tracking and beyond 3 sigma | worst of these mm "
         "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         request.seeds, request.imu ? "" : ", no IMU", 1e3 * kLocked_m, request.within_s);
-  for (std::size_t i = 0; i < all.size(); ++i) print_starts((*recordings)[i].name, all[i], request);
-  if (!is_wanted(kWrong, request)) return {};
-  std::printf(
-      "\n%d starts each from the true pose, watched for %.1f s, with what cannot be tracked. Beyond: an "
-      "error of more than 3 sigma in an axis.\n\n"
-      "| recording | what is wrong | starts ever called tracking, and beyond | %% of updates called so | "
-      "%% of updates with a pose beyond | starts lost at the end |\n|---|---|---|---|---|---|\n",
-      request.seeds, kWatched_s);
-  for (std::size_t i = 0; i < all.size(); ++i) print_wrong((*recordings)[i].name, all[i], all, request);
-  return {};
+  std::string looks = StartLooks::header();
+  for (std::size_t i = 0; i < all.size(); ++i) print_starts((*recordings)[i].name, all[i], request, &looks);
+  if (is_wanted(kWrong, request)) print_all_wrong(*recordings, all, request, &looks);
+  return request.looks.empty() ? Status{} : write_text_file(request.looks, looks);
 }
 
 }  // namespace evpose::experiments

@@ -12,6 +12,7 @@ struct RelocalizationRequest {
   int threads = 2;
   bool imu = true;
   double within_s = 0.5;  ///< of the start: so long it is watched
+  std::string looks;      ///< file for what each update says of its pose (StartLooks); empty: none
 };
 
 /// Starts from wrong poses anywhere in the recordings: is the pose found, how soon, and is a wrong one ever

@@ -37,6 +37,7 @@ BENCHMARKS = {
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
     "relocalization": ("experiments", "make_relocalization", "starts from wrong poses and with wrong maps", "20 min"),
+    "probability": ("probability", "make", "whether poses are right: what is told and what is; wants the flights of unseen", "40 min"),
     "starts": ("starts", "make", "40 starts of each kind on shared and unseen recordings; wants the flights of unseen", "90 min"),
     "kidnapping": ("experiments", "make_kidnapping", "live sessions whose data stop while the camera moves on", "5 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),

@@ -30,15 +30,19 @@ def starts(bench, folder, name, seeds):
     return {row["start off by"]: row for row in tables.read(printed)[""]}
 
 
+def linked(scratch, flight):
+    """Name of a folder in `scratch` with the flight and its true calibration."""
+    folder = scratch / flight.folder.name
+    folder.mkdir()
+    for name in FOLDER_FILES:
+        (folder / name).symlink_to((flight.folder / name).resolve())
+    shutil.copy(flight.folder / "camchain-imucam_truth.yaml", folder / "camchain-imucam.yaml")
+    return folder.name
+
+
 def of_flight(bench, flight, seeds):
-    """With the true calibration."""
     with bench.folder() as scratch:
-        folder = scratch / flight.folder.name
-        folder.mkdir()
-        for name in FOLDER_FILES:
-            (folder / name).symlink_to((flight.folder / name).resolve())
-        shutil.copy(flight.folder / "camchain-imucam_truth.yaml", folder / "camchain-imucam.yaml")
-        return starts(bench, scratch, folder.name, seeds)
+        return starts(bench, scratch, linked(scratch, flight), seeds)
 
 
 def shown(row):

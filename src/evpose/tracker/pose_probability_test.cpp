@@ -37,8 +37,8 @@ TEST(PoseProbabilityLaws, OddsAreThoseOfIndependentLooksMultiplied) {
   const double one = PoseProbability::log_odds(look(0.3), kConcentration);
   p.add(look(0.3), kConcentration, 0.05);
   EXPECT_NEAR(log_odds(p), one, 1e-9);
-  p.add(look(0.2), kConcentration, 0.1);
-  EXPECT_NEAR(log_odds(p), one + 2 * PoseProbability::log_odds(look(0.2), kConcentration), 1e-9);
+  p.add(look(0.05), kConcentration, 0.1);
+  EXPECT_NEAR(log_odds(p), one + 2 * PoseProbability::log_odds(look(0.05), kConcentration), 1e-9);
 }
 
 TEST(PoseProbabilityLaws, HowOftenItIsLookedDoesNotMatter) {

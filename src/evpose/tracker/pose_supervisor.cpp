@@ -24,7 +24,7 @@ constexpr double kFoundFades_s = 0.5;  // while events confirm it, in a map that
 constexpr double kSlides_m_s = 0.3, kSlides_rad_s = 0.1;
 constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
-constexpr const char* kImprobable = "wrong poses look as the contours and events do now";
+constexpr const char* kImprobable = "pose in doubt: contours and events agree no better than at wrong poses";
 constexpr const char* kOneDirection =
     "not in this map, or far from the pose: contours of one direction lie where no events are";
 

@@ -40,9 +40,10 @@ constexpr double kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
 constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
-constexpr double kLeastLead = 1.15;                    // over the next pose, in support
-constexpr double kLeastExplained = 0.06;               // of all events, beyond an even spread; wide searches
-constexpr double kClearLead = 2;                       // makes a low concentration enough
+constexpr double kLeastLead = 1.15;       // over the next pose, in support
+constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
+constexpr double kClearLead = 2,
+                 kAloneConcentration = 0.22;  // so far ahead, that much is enough; evenly spread: 0.15
 constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
 
 // Searches that compete, each in events of its own: a pose is believed that several of them have found.
@@ -343,7 +344,7 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
   const bool concentrated =
       best.mean_concentration >= kLeastConcentration && best.mean_support >= kLeastLead * rival_support;
   const bool alone =
-      best.mean_concentration >= kLowConcentration && best.mean_support >= kClearLead * rival_support;
+      best.mean_concentration >= kAloneConcentration && best.mean_support >= kClearLead * rival_support;
   return concentrated || (alone && !compete);
 }
 

@@ -36,7 +36,7 @@ BENCHMARKS = {
     "frames": ("frames", "make", "frames alone, events alone and both, on simulated flights", "15 min"),
     "fusion": ("experiments", "make_fusion", "back ends side by side, on shared and simulated flights", "1 h"),
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
-    "relocalization": ("experiments", "make_relocalization", "starts from wrong poses and with wrong maps", "20 min"),
+    "relocalization": ("experiments", "make_relocalization", "what cannot be tracked: other maps, mirrored ones, starts 3 m off, noise", "10 min"),
     "probability": ("probability", "make", "whether poses are right: what is told and what is; wants the flights of unseen", "40 min"),
     "starts": ("starts", "make", "40 starts of each kind on shared and unseen recordings; wants the flights of unseen", "90 min"),
     "kidnapping": ("experiments", "make_kidnapping", "live sessions whose data stop while the camera moves on", "5 min"),

@@ -14,7 +14,7 @@ import harness
 import starts
 import tables
 
-SEEDS = 2
+SEEDS = 1
 FLIGHTS = 16  # quick ones, of development seeds
 THINNED = 4   # updates of a start: neighbouring ones look alike
 STARTS = "wrong,10"

@@ -88,4 +88,4 @@ def make(bench):
              for r in bench.peers()}
     return bench.write_page("starts", {
         "recordings": cells(shared | flights), "together": summary(shared | flights, seeds),
-        "built": cells(built), "built_together": summary(built, built_seeds, BUILT_LESS)}, harness.machine())
+        "built": [*cells(built), "", *summary(built, built_seeds, BUILT_LESS)]}, harness.machine())

@@ -7,7 +7,7 @@
 namespace evpose {
 namespace {
 
-constexpr double kGiven = 3;                  // log-odds: 95 %
+constexpr double kGiven = 4;                  // log-odds: 98 %
 constexpr double kIndependent_s = 0.05;       // apart, looks count as different ones
 constexpr double kSurest = 10, kLeast = -20;  // log-odds: what was seen long ago is no proof for ever
 constexpr double kLeastRatio = 0.05, kMostRatio = 10;

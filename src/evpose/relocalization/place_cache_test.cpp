@@ -117,6 +117,14 @@ TEST_F(PlaceCacheLaws, WhatWasKeptOfAnotherMapIsNotTaken) {
   expect_same(*PlaceCache(table).over(contours_, config_, all), made);
 }
 
+TEST_F(PlaceCacheLaws, ACopyHasTheSameIndicesAndMakesItsOwnFromThenOn) {
+  const auto wide = cache_.over(contours_, config_, box(-20, 20));
+  PlaceCache copy(cache_);
+  EXPECT_EQ(copy.over(contours_, config_, box(-20, 20)), wide);
+  const auto fine = copy.over(contours_, config_, box(1, 2));
+  EXPECT_NE(cache_.over(contours_, config_, box(1, 2)), fine);
+}
+
 TEST_F(PlaceCacheLaws, PlacesThatAreMuchCoarserAreNotTaken) {
   const auto wide = cache_.over(contours_, config_, box(-20, 20));
   const auto fine = cache_.over(contours_, config_, box(1, 2));

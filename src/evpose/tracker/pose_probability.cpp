@@ -14,7 +14,7 @@ constexpr double kLeastRatio = 0.05, kMostRatio = 10;
 
 }  // namespace
 
-// Logistic regression of looks at right and wrong poses: benchmarks/run.py verification.
+// Logistic regression of looks at right and wrong poses: benchmarks/run.py probability.
 double PoseProbability::log_odds(const PoseEvidence& look, double gate_concentration) {
   const double ratio = std::log(std::max(look.ratio, kLeastRatio));
   const double worst = std::log(std::clamp(look.worst_ratio, kLeastRatio, kMostRatio));

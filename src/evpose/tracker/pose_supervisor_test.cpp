@@ -19,6 +19,7 @@ using test_flight::pose_at;
 
 constexpr double kUpdate_s = 3e-3, kFlight_s = 1.9;
 constexpr int kLookEvery = 4;  // updates
+constexpr double kConcentration = 0.4, kConcentrationOff = 0.2;
 
 class PoseSupervisorLaws : public ::testing::Test {
  protected:
@@ -57,6 +58,7 @@ class PoseSupervisorLaws : public ::testing::Test {
     std::iota(points.begin(), points.end(), 0U);
     RegistrationResult registration;
     registration.points = registration.inliers = 100;
+    registration.gate_concentration = off.isZero() ? kConcentration : kConcentrationOff;
     for (const double until_s = t_s_ + duration_s; t_s_ < until_s; t_s_ += kUpdate_s, ++updates_) {
       if (updates_ % kLookEvery == 0 && !supervisor.searching()) look(supervisor, view, points, off);
       std::string reason;
@@ -114,6 +116,20 @@ TEST_F(PoseSupervisorLaws, WhereEventsContradictItItIsSearchedLaterInAMapThatSta
   EXPECT_FALSE(built.searching());
   fly(built, 0.5, world_, far_off());
   EXPECT_TRUE(built.searching());
+}
+
+TEST_F(PoseSupervisorLaws, ItIsTrackingOnceItIsProbableAndNoLongerThanThat) {
+  PoseSupervisor supervisor = given_pose(true);
+  EXPECT_LT(supervisor.probability(), PoseProbability::kBelieved);
+  while (t_s_ < 0.3) {
+    fly(supervisor, kUpdate_s, world_);
+    const bool probable = supervisor.probability() >= PoseProbability::kBelieved;
+    EXPECT_TRUE(probable || health_ != Health::tracking) << t_s_;
+  }
+  EXPECT_EQ(health_, Health::tracking);
+  fly(supervisor, 0.4, world_, far_off());
+  EXPECT_LT(supervisor.probability(), 0.5);
+  EXPECT_NE(health_, Health::tracking);
 }
 
 /// As maps of clouds often are: contours of one direction stand where nothing is.

@@ -24,6 +24,8 @@ constexpr std::array kExplanations{
     Explanation{"not in this map",
                 "the map is of another place or mirrored, or the start is further off than was said",
                 "check --map and --init; give the start's true error with --init-sigma"},
+    Explanation{"pose in doubt", "part of the map is wrong or has changed, or little of it is in view",
+                "look at the report's pictures: contours must lie on events; fly on, or give another --map"},
     Explanation{"do not gather", "wrong map, start or calibration: contours are not where the events are",
                 "look at the report's pictures: contours must lie on events; `evpose check` the recording"},
     Explanation{"IMU contradicts", "axes, units or clock of the IMU do not fit the camera's",

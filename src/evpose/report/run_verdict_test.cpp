@@ -78,6 +78,7 @@ TEST(RunVerdict, EveryReasonOfTheTrackerHasACauseOfItsOwnAndARemedy) {
   std::set<std::string> causes;
   const std::vector<std::string> reasons{
       "events do not gather at the contours",
+      "pose in doubt: contours and events agree no better than at wrong poses",
       "IMU contradicts the camera",
       "no registration for 0.1 s: no map point in view",
       "only 3 of 200 map points have events near by",

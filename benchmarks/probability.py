@@ -80,9 +80,11 @@ def features(row):
 def fitted(rows):
     """Weights of a logistic regression, right and wrong looks counting alike, and how many there are of each. In a mirrored map
     some of what is in view is right; what is neither near nor far is left out, too."""
-    clear = [(row, float(row["error_mm"]) < NEAR_MM) for row in rows if not is_mirrored(row) and row["accepted"] == "1"
-             and not NEAR_MM < float(row["error_mm"]) < FAR_MM]
-    clear = [(row, near and row["start"] not in ("map of another place", "white noise for events")) for row, near in clear]
+    clear = []
+    for row in rows:
+        error_mm, nothing_to_find = float(row["error_mm"]), row["start"] in ("map of another place", "white noise for events")
+        if row["accepted"] == "1" and not is_mirrored(row) and (nothing_to_find or not NEAR_MM < error_mm < FAR_MM):
+            clear.append((row, error_mm < NEAR_MM and not nothing_to_find))
     A = np.array([features(row) for row, _ in clear])
     right = np.array([float(near) for _, near in clear])
     weight = np.where(right == 1, 0.5 / right.mean(), 0.5 / (1 - right.mean()))

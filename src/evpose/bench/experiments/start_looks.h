@@ -31,7 +31,6 @@ class StartLooks {
   Start start_;
   TimeNs begin_;
   const std::vector<TimedPose>* truth_;
-  bool found_ = false;  ///< the pose has been searched
   std::string rows_;
 };
 

@@ -62,7 +62,7 @@ nlohmann::ordered_json as_json(const FlightReport& r) {
 void print_flight(const FlightReport& r) {
   std::printf(
       "flight     %s: %.1f s, tracked %.0f %%, contours seen from %.1f deg apart\n"
-      "contours   %.1f m moved, %.1f m struck out, %.1f m gone, %.1f m new on planes, %.1f m of the map not "
+      "contours   %.1f m moved, %.1f m struck out, %.1f m gone, %.1f m new, %.1f m of the map not "
       "told\n"
       "events     %.0f %% lie on contours, %.0f %% before\n"
       "frame      all together stand within %.1f mm (1 sigma) along %s, %.1f and %.1f mm across, %.3f deg\n",
@@ -216,8 +216,8 @@ int learn(const LearnRequest& request) {
   const auto placement = read_map_placement(request.map);
   if (!placement) return bad_input(placement.error());
   if (map->planes.empty() || map->polygons.empty())
-    return bad_input({request.map, "has no planes: markings are learnt on planes",
-                      "build the map from a cloud (evpose map build)"});
+    log_warning(
+        text(request.map, ": has no planes: no markings are learnt, contours are moved and struck out only"));
   for (std::size_t i = 0; i < request.runs.size(); ++i)
     if (const auto run = map_learn::read_run_of(request.runs[i], request.recordings[i], request.map); !run)
       return bad_input(run.error());
@@ -230,7 +230,7 @@ void add_map_learn(CLI::App& map, std::function<int()>& run) {
   auto request = std::make_shared<LearnRequest>();
   auto* command = map.add_subcommand(
       "learn", "Make a map better by flights through it: contours moved, struck out, learnt anew");
-  command->add_option("map", request->map, "map with planes, as evpose map build makes it")->required();
+  command->add_option("map", request->map, "map, with planes best, as evpose map build makes it")->required();
   command->add_option("recordings", request->recordings, "flights, in the order in which they count")
       ->required();
   command->add_option("-o,--output", request->output, "map file; a report is written beside it")

@@ -25,7 +25,7 @@ from corridor import corridor
 from recording import Recording
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "benchmarks"))
-from changed_map import file_checksum
+from changed_map import MARKING, file_checksum
 
 EVPOSE = None
 FLIGHT = """
@@ -118,6 +118,17 @@ class FlightTest(unittest.TestCase):
         self.assertRegex(done.stderr, r"^evpose: [^\n]*hover[^\n]*tells nothing[^\n]*\n$")
         self.assertFalse(list(self.root.glob("new*")))
 
+    def test_without_planes_and_without_an_imu_there_are_no_markings(self):
+        self.run_program("convert", self.root / "flight", self.root / "no_imu")
+        for name in ("imu.csv", "imu.yaml"):
+            (self.root / "no_imu" / name).unlink()
+        for flight in ("flight", "no_imu"):
+            with self.subTest(flight):
+                self.learn(f"of_{flight}.h5", self.root / flight, "--init", "groundtruth", map_file="flight/contours.ply")
+                self.assertGreater(self.report(f"of_{flight}.h5")["flights"][0]["moved_m"], 5)
+                with h5py.File(self.root / f"of_{flight}.h5") as file:
+                    self.assertNotIn(MARKING, file["contours/kind"][:])
+
     def test_planes_that_are_off_by_a_centimetre_move_no_contour_with_them(self):
         shutil.copy(self.root / "map.h5", self.root / "off.h5")
         with h5py.File(self.root / "off.h5", "r+") as file:
@@ -172,9 +183,6 @@ class LearnTest(unittest.TestCase):
 
     def test_a_flight_of_another_place(self):
         self.assertRegex(self.refused(self.root / "map.h5", self.root / "recording"), "recording: was tracked in|comes into view")
-
-    def test_a_map_without_planes(self):
-        self.assertIn("has no planes", self.refused(self.root / "recording/contours.ply", self.root / "recording"))
 
     def test_a_recording_that_is_not_there(self):
         self.assertIn("none", self.refused(self.root / "map.h5", self.root / "none"))

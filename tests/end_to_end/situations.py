@@ -399,7 +399,6 @@ SECTIONS = {
         Situation("Board without a size", "map board --checkerboard 9x7 -o new.h5", 2, ["--square", "metres"]),
         Situation("Board in millimetres", "map board --checkerboard 9x7 --square 80 -o new.h5", 2, ["--square", "millimetres", "metres"]),
         Situation("Discs that touch", "map board --circles 4x11 --distance 0.02 --diameter 0.05 -o new.h5", 2, ["touch", "diameter"]),
-        Situation("Learning from a map without planes", "map learn map.h5 flight -o new.h5", 2, ["map.h5", "no planes", "evpose map build"]),
         Situation("Learning over the map itself", "map learn map.h5 flight -o map.h5", 2, ["map.h5", "learnt from", "another"]),
         Situation("Learning from a flight that is not there", "map learn map.h5 nowhere -o new.h5", 2, ["nowhere", "not exist"]),
         Situation("Learning from more runs than flights", "map learn map.h5 flight -o new.h5 --run run run", 2, ["--run", "2 runs of 1", "one for each"]),

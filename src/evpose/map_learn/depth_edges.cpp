@@ -237,6 +237,21 @@ std::vector<ContourPoint> points_of(const SweptPiece& piece, const Eigen::Vector
   return out;
 }
 
+constexpr float kOfRound = 1.3F, kRoundError_m = 0.01F;  // of a body's radius and beside it
+constexpr float kUpright = 0.95F, kBesideAxis_m = 0.1F;
+
+/// The side of a round body is elsewhere from another place.
+bool is_side_of_round_body(const ContourPoint& p, const ContourMap& map) {
+  return std::any_of(map.points.begin(), map.points.end(), [&](const ContourPoint& axis) {
+    if (axis.kind != ContourKind::cylinder_axis || std::abs(axis.tangent.dot(p.tangent)) < kUpright)
+      return false;
+    const Eigen::Vector3f d = p.position - axis.position;
+    const float along = d.dot(axis.tangent);
+    return std::abs(along) < kBesideAxis_m &&
+           (d - along * axis.tangent).norm() < kOfRound * axis.sigma + kRoundError_m;
+  });
+}
+
 }  // namespace
 
 std::vector<SweptPiece> shared_pieces(std::vector<SweptPiece> pieces) {
@@ -274,8 +289,9 @@ Expected<std::vector<ContourPoint>> find_depth_edges(const TrackJob& job, const 
   for (const SweptPiece& piece : shared_pieces(sweeper.pieces())) {
     const auto points = points_of(piece, job.map->anchor, first_contour);
     const auto beside = std::count_if(points.begin(), points.end(), [&](const ContourPoint& p) {
-      return neighbours.beside(p.position, p.tangent,
-                               static_cast<float>(std::max(kFromContour_m, piece.across_sigma_m)));
+      const double within_m = std::max(kFromContour_m, piece.across_sigma_m);
+      return neighbours.beside(p.position, p.tangent, static_cast<float>(within_m)) ||
+             is_side_of_round_body(p, *job.map);
     });
     if (2 * beside > static_cast<std::ptrdiff_t>(points.size())) continue;
     out.insert(out.end(), points.begin(), points.end());

@@ -25,7 +25,8 @@ constexpr int kLeastObservations = 5;  // a quarter of a second
 constexpr double kWorstChi2 = 3;
 constexpr double kLargestDelay_px = 0.25;
 constexpr double kLargestSigma_m = 3e-3;
-constexpr double kLargestHeight_m = 3e-3;  // of a marking over its plane, beside three sigmas
+constexpr double kLargestHeight_m = 3e-3;      // of a marking over its plane, beside three sigmas
+constexpr double kLargestDepthSigma_m = 0.02;  // of an edge on no plane
 
 }  // namespace
 
@@ -59,7 +60,7 @@ void LearningMap::displace(const std::vector<Eigen::Vector3d>& displacements) {
     map_.points[i].position += displacements[i].cast<float>();
 }
 
-void LearningMap::add_markings(const std::vector<ContourPoint>& points) {
+void LearningMap::add_new(const std::vector<ContourPoint>& points) {
   for (const ContourPoint& p : points) {
     map_.points.push_back(p);
     records_.push_back({p.position, p.sigma, true});
@@ -112,6 +113,8 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
     const double stated = sigma[s] / points[s];
     if (told) {
       l = told_before(l, place[s] / points[s], stated);
+    } else if (record[s]->is_new && example[s]->kind != ContourKind::marking) {
+      l.sigma_m = {kAlongPlane_m, kAlongPlane_m};
     } else if (example[s]->kind == ContourKind::marking) {
       l.sigma_m = record[s]->is_new ? Eigen::Vector2d(kAlongPlane_m, kOffPlane_m)
                                     : Eigen::Vector2d(stated, stated / kViewChange);
@@ -128,17 +131,21 @@ namespace {
 
 enum class Verdict { untold, good, wrong };
 
-/// What the events say of a landmark.
-Verdict judge(const LandmarkEstimate& e, const Landmark& l, bool marking, bool contrast_is_known) {
+/// What the events say of a landmark. A given contour has the cloud's word, too.
+Verdict judge_given(const LandmarkEstimate& e) {
   if (e.observations < kLeastObservations) return Verdict::untold;
-  const bool sure = e.chi2 < kWorstChi2 && std::abs(e.delay_px) < kLargestDelay_px;
-  if (!marking) return sure ? Verdict::good : Verdict::wrong;
-  const double height = l.moved_m(1) + e.move_m(1);
-  return sure && contrast_is_known &&
-                 std::abs(height) < kLargestHeight_m + 3 * std::sqrt(e.covariance(1, 1)) &&
-                 std::sqrt(e.seen_variance_m2) < kLargestSigma_m
-             ? Verdict::good
-             : Verdict::wrong;
+  return e.chi2 < kWorstChi2 && std::abs(e.delay_px) < kLargestDelay_px ? Verdict::good : Verdict::wrong;
+}
+
+Verdict judge_found(const LandmarkEstimate& e, const Landmark& l, ContourKind kind, bool contrast_is_known) {
+  const Verdict verdict = judge_given(e);
+  if (verdict != Verdict::good) return verdict;
+  const bool placed =
+      kind == ContourKind::marking
+          ? std::abs(l.moved_m(1) + e.move_m(1)) < kLargestHeight_m + 3 * std::sqrt(e.covariance(1, 1))
+          : e.covariance.trace() < kLargestDepthSigma_m * kLargestDepthSigma_m;
+  const bool sure = placed && contrast_is_known && std::sqrt(e.seen_variance_m2) < kLargestSigma_m;
+  return sure ? Verdict::good : Verdict::wrong;
 }
 
 }  // namespace
@@ -148,8 +155,8 @@ void LearningMap::take(const LandmarkEstimate& e, const Landmark& l, const Eigen
   ContourPoint& p = map_.points[point];
   p.position += (l.directions * e.move_m).cast<float>();
   const double elsewhere = kViewChange * kViewChange * e.covariance.trace();
-  p.sigma = static_cast<float>(std::sqrt(e.seen_variance_m2 + elsewhere + kFloor_m * kFloor_m));
   Record& record = records_[point];
+  p.sigma = static_cast<float>(std::sqrt(e.seen_variance_m2 + elsewhere + kFloor_m * kFloor_m));
   record.was_told = true;
   constexpr int kMost = std::numeric_limits<std::uint16_t>::max();
   const auto before = static_cast<float>(record.looks), now = static_cast<float>(e.observations);
@@ -183,12 +190,14 @@ void LearningMap::apply(const AdjustmentResult& result, const ContourSegments& s
     const std::uint32_t s = segments.of_point[i];
     ContourPoint& p = map_.points[i];
     Record& record = records_[i];
-    const bool marking = p.kind == ContourKind::marking;
     const LandmarkEstimate& e = result.landmarks[s];
     record.silent = observed.silent[s];
     const bool vanished = record.silent && record.told_before;
-    const Verdict verdict =
-        vanished ? Verdict::wrong : judge(e, unknowns[s], marking, observed.map.points[i].contrast != 0);
+    const bool found = record.is_new || p.kind == ContourKind::marking;
+    const Verdict verdict = vanished ? Verdict::wrong
+                            : found
+                                ? judge_found(e, unknowns[s], p.kind, observed.map.points[i].contrast != 0)
+                                : judge_given(e);
     if (verdict == Verdict::good) {
       take(e, unknowns[s], views[s], i);
       p.contrast = observed.map.points[i].contrast;

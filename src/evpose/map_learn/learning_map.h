@@ -19,7 +19,7 @@ struct LearntLengths {
   double struck_m = 0;  ///< of the given map, contradicted by events
   double gone_m = 0;    ///< of the given map, had told its contrast before and was seen without events
   double silent_m = 0;  ///< of kept_m: seen without events, but never known to tell any
-  double new_m = 0;     ///< markings that were learnt
+  double new_m = 0;     ///< markings and depth edges that were learnt
 };
 
 /// A map whose contours move, go and come while flights are adjusted to it.
@@ -31,8 +31,8 @@ class LearningMap {
   const ContourMap& map() const { return map_; }
   /// Moves the given contours to where they are already known to stand off: of each point, map frame, m.
   void displace(const std::vector<Eigen::Vector3d>& displacements);
-  /// Markings whose place is as well known as the trajectory that they were seen from.
-  void add_markings(const std::vector<ContourPoint>& points);
+  /// Markings, or edges on no plane, whose place is as well known as the trajectory that they were seen from.
+  void add_new(const std::vector<ContourPoint>& points);
 
   /// The contrast segments of map() as unknowns, with what was known of each before this flight. What
   /// earlier flights have told shares the error of their frame: unknowns 0 to 5 (LearntFrame).
@@ -58,7 +58,7 @@ class LearningMap {
   struct Record {
     Eigen::Vector3f given = Eigen::Vector3f::Zero();  ///< where it was before this flight
     float given_sigma = 0;
-    bool is_new = false;       ///< a marking of this flight
+    bool is_new = false;       ///< found by this flight
     bool was_told = false;     ///< by events of this flight
     bool told_before = false;  ///< its contrast is known from before this flight
     bool silent = false;       ///< as last seen

@@ -137,7 +137,7 @@ TEST(LearningMap, OnlyAContourThatHadEventsBeforeIsGoneWithoutThem) {
 TEST(LearningMap, AMarkingStaysIfEventsTellItsPlaceAndContrast) {
   for (const std::int8_t contrast : {std::int8_t{0}, std::int8_t{1}}) {
     LearningMap map(two_rims());
-    map.add_markings(marking(0.53F));
+    map.add_new(marking(0.53F));
     const ContourSegments segments = cut_into_segments(map.map());
     AdjustmentResult result = nothing_told(segments.count);
     result.landmarks[segments.of_point[25]] = good(1e-3);
@@ -149,7 +149,7 @@ TEST(LearningMap, AMarkingStaysIfEventsTellItsPlaceAndContrast) {
 
 TEST(LearningMap, ANewMarkingIsFreeAlongItsPlaneAndOneOfAnEarlierFlightIsHeldByItsSigma) {
   LearningMap first(two_rims());
-  first.add_markings(marking(0.53F));
+  first.add_new(marking(0.53F));
   ContourSegments segments = cut_into_segments(first.map());
   EXPECT_GT(first.landmarks(segments)[segments.of_point[25]].sigma_m(0), 0.02);
   AdjustmentResult result = nothing_told(segments.count);

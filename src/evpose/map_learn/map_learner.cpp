@@ -9,6 +9,7 @@
 
 #include "evpose/batch/batch_estimator.h"
 #include "evpose/core/log.h"
+#include "evpose/map_learn/depth_edges.h"
 #include "evpose/map_learn/observe_flight.h"
 #include "evpose/map_learn/plane_events.h"
 #include "evpose/map_learn/tracked_run.h"
@@ -36,13 +37,14 @@ class FlightLearner {
   Status track(BatchEstimator& estimator);
   Status take_run(BatchEstimator& estimator);
   Status smooth();
-  Status find_markings_of_flight();
+  Status find_edges(bool off_planes);
   Status adjust_once();
   Status check_worth() const;
   void use(const ContourMap& map);
   void report(const AdjustmentResult& result, const FlightObservations& seen);
   /// Of the steps of the work: the share of the present one, 0..1.
   bool go_on(double share) {
+    // Markings are looked for in all passes but the last, depth edges in one.
     constexpr double kSteps = 1 + kSmoothings + 2 * kPasses;
     return !(interrupted_ = interrupted_ || !progress_(std::min(1.0, (steps_done_ + share) / kSteps)));
   }
@@ -77,8 +79,6 @@ Status FlightLearner::prepare_flight(const ContourMap& map) {
   }
   auto job = prepare(request_, *asked);
   if (!job) return job.error();
-  if (!job->recording.has_imu)
-    return Error{request_.recording, "has no IMU", "learn from recordings with an IMU"};
   job_.emplace(std::move(*job));
   use(map);
   return {};
@@ -125,12 +125,20 @@ Status FlightLearner::smooth() {
   return {};
 }
 
-Status FlightLearner::find_markings_of_flight() {
-  const auto planes = events_on_planes(*job_, trajectory_, [&](double share) { return go_on(share); });
+/// On planes first, whose place is known best; then what is on none.
+Status FlightLearner::find_edges(bool off_planes) {
+  const auto progress = [&](double share) { return go_on(share); };
+  const auto planes = events_on_planes(*job_, trajectory_, progress);
   ++steps_done_;
   if (!planes) return planes.error();
-  if (!interrupted_)
-    learning_.add_markings(find_markings(*planes, learning_.map(), learning_.next_contour()));
+  if (interrupted_) return {};
+  learning_.add_new(find_markings(*planes, learning_.map(), learning_.next_contour()));
+  if (!off_planes) return {};
+  use(learning_.map());
+  const auto edges = find_depth_edges(*job_, trajectory_, learning_.next_contour(), progress);
+  ++steps_done_;
+  if (!edges) return edges.error();
+  if (!interrupted_) learning_.add_new(*edges);
   return {};
 }
 
@@ -219,7 +227,7 @@ Expected<LearntMap> FlightLearner::learn() {
   if (auto ok = smooth(); !ok) return ok.error();
   for (int pass = 0; pass < kPasses && !interrupted_; ++pass) {
     if (pass + 1 < kPasses)
-      if (auto ok = find_markings_of_flight(); !ok) return ok.error();
+      if (auto ok = find_edges(pass + 2 == kPasses); !ok) return ok.error();
     if (interrupted_) break;
     if (auto ok = adjust_once(); !ok) return ok.error();
   }

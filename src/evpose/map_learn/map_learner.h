@@ -43,9 +43,9 @@ struct LearntMap {
   Trajectory trajectory;  ///< of the flight, as adjusted
 };
 
-/// Smooths the recording of the flight with `map` in place of the request's, finds markings on its planes,
-/// and adjusts trajectory, contours and markings together. Interrupted: an empty map. Errors: of the
-/// recording; no IMU; a run of something else; a flight that was lost, or that tells nothing.
+/// Smooths the recording of the flight with `map` in place of the request's, finds markings on its planes and
+/// edges off them, and adjusts trajectory, contours and what was found together. Interrupted: an empty map.
+/// Errors: of the recording; a run of something else; a flight that was lost, or that tells nothing.
 Expected<LearntMap> learn_from_flight(const Flight& flight, const ContourMap& map,
                                       const LearnProgress& progress);
 

@@ -30,12 +30,14 @@ struct Sum {
 /// In place of a fusion: the state is that of a known trajectory; what is measured is kept.
 class ObservingBackEnd final : public BackEnd {
  public:
-  struct ImuStep {
-    ImuSample a, b;
-    ImuTrust trust;
+  /// From one time to another, by readings of the IMU or, without one, by constant velocity.
+  struct Step {
+    TimeNs from, until;
+    std::optional<std::pair<ImuSample, ImuSample>> imu;
+    ImuTrust trust = ImuTrust::good;
   };
   struct Log {
-    std::vector<ImuStep> imu;
+    std::vector<Step> steps;
     std::map<std::pair<std::uint32_t, TimeNs>, Sum> sums;  ///< by segment and bin
   };
 
@@ -55,12 +57,12 @@ class ObservingBackEnd final : public BackEnd {
     state_.t = first.t;
   }
   void predict(const ImuSample& a, const ImuSample& b, ImuTrust trust) override {
-    log_.imu.push_back({a, b, trust});
-    predict(b.t);
+    log_.steps.push_back({a.t, b.t, std::pair(a, b), trust});
+    move_to(b.t);
   }
   void predict(TimeNs t) override {
-    state_ = state_at(trajectory_, t);
-    state_.t = t;
+    log_.steps.push_back({state_.t, t, {}});
+    move_to(t);
   }
   void update(const PoseInformation&, std::span<const ContourOffset> contours) override {
     const Eigen::Matrix3d R = state_.nav.T_map_body.rotation();
@@ -80,6 +82,11 @@ class ObservingBackEnd final : public BackEnd {
   const FusionState& state() const override { return state_; }
 
  private:
+  void move_to(TimeNs t) {
+    state_ = state_at(trajectory_, t);
+    state_.t = t;
+  }
+
   const Trajectory& trajectory_;
   Pose T_body_cam_;
   double event_variance_;
@@ -94,10 +101,10 @@ std::vector<std::size_t> choose_knots(const Trajectory& trajectory) {
   return knots;
 }
 
-/// What the IMU's readings say of each step between knots, about the trajectory.
+/// What the IMU's readings, or constant velocity, say of each step between knots, about the trajectory.
 std::vector<KnotStep> steps_between(const Trajectory& trajectory, const std::vector<std::size_t>& knots,
                                     const StatePropagator& propagator,
-                                    const std::vector<ObservingBackEnd::ImuStep>& imu) {
+                                    const std::vector<ObservingBackEnd::Step>& log) {
   using error_state::kPhi;
   std::vector<KnotStep> steps;
   std::size_t next = 0;
@@ -106,10 +113,13 @@ std::vector<KnotStep> steps_between(const Trajectory& trajectory, const std::vec
     FusionState s = trajectory[knots[k]];
     s.covariance.setZero();
     KnotStep step;
-    while (next < imu.size() && imu[next].a.t < s.t) ++next;
-    for (; next < imu.size() && imu[next].b.t <= there.t; ++next) {
+    while (next < log.size() && log[next].from < s.t) ++next;
+    for (; next < log.size() && log[next].until <= there.t; ++next) {
       Matrix15d transition;
-      propagator.propagate(s, imu[next].a, imu[next].b, imu[next].trust, &transition);
+      if (const auto& imu = log[next].imu)
+        propagator.propagate(s, imu->first, imu->second, log[next].trust, &transition);
+      else
+        propagator.propagate(s, log[next].until, &transition);
       step.transition = (transition * step.transition).eval();
     }
     // A noise of nothing at all would make a step that can never be corrected.
@@ -189,7 +199,7 @@ Expected<FlightObservations> observe_flight(const TrackJob& job, const Trajector
   (*tracker)->on_update([&](const Update& u) { matched += u.events_matched, read += u.events_read; });
   if (auto ok = feed_recording(job.recording, job.config, **tracker, progress); !ok) return ok.error();
   out.explained = matched / std::max(1.0, read);
-  out.steps = steps_between(trajectory, out.knots, *propagator, log.imu);
+  out.steps = steps_between(trajectory, out.knots, *propagator, log.steps);
   take_sums(log, trajectory, out);
   out.silent = find_silent(job, trajectory, log);
   out.map = (*tracker)->map_with_learnt_contrast();

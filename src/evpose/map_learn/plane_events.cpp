@@ -7,11 +7,12 @@
 
 #include "evpose/map/depth_buffer.h"
 #include "evpose/map/triangulation.h"
+#include "evpose/map_learn/contour_neighbours.h"
+#include "evpose/map_learn/flight_events.h"
 
 namespace evpose::map_learn {
 namespace {
 
-constexpr double kPacket_s = 2.5e-4;       // events of one pose: the image moves by less than 0.1 px
 constexpr TimeNs kRedraw = 10 * kNsPerMs;  // of the planes that are seen
 constexpr double kCell_px = 0.5;           // of the grid on a plane
 constexpr double kSmallestCell_m = 1e-3;
@@ -23,18 +24,12 @@ constexpr double kGrazing = 0.17;               // sine of the angle to the plan
 /// What the pixels of a camera see of a map's planes.
 class PlaneView {
  public:
-  PlaneView(const TrackJob& job) : map_(job.map->anchor), camera_(*job.setup.camera), buffer_({1, 1}, 1) {
+  explicit PlaneView(const TrackJob& job)
+      : map_(job.map->anchor),
+        camera_(*job.setup.camera),
+        rays_(pixel_rays(camera_)),
+        buffer_(largest_tangents(rays_), 2 / camera_.focal_px()) {
     label_triangles(*job.map);
-    const ImageSize size = camera_.size();
-    Eigen::Vector2d tangents = Eigen::Vector2d::Zero();
-    for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x) {
-        const auto ray = camera_.unproject({x, y});
-        const bool ahead = ray && ray->z() > 0.1;
-        rays_.push_back(ahead ? Eigen::Vector3d(*ray / ray->z()) : Eigen::Vector3d::Zero());
-        if (ahead) tangents = tangents.cwiseMax(rays_.back().head<2>().cwiseAbs());
-      }
-    buffer_ = DepthBuffer(tangents, 2 / camera_.focal_px());
   }
 
   void look(const Pose& T_map_cam) {
@@ -97,10 +92,10 @@ class PlaneView {
 
   Eigen::Vector3d map_;
   const Camera& camera_;
-  ContourMap labelled_;  ///< its occluders are the planes' polygons
+  std::vector<Eigen::Vector3d> rays_;  ///< pixel_rays()
+  ContourMap labelled_;                ///< its occluders are the planes' polygons
   std::vector<int> plane_of_;
   std::vector<std::pair<Eigen::Vector3d, double>> planes_;  ///< normal . x + d = 0, map frame
-  std::vector<Eigen::Vector3d> rays_;                       ///< of the pixels, with z = 1; zero: none
   DepthBuffer buffer_;
   Pose T_map_cam_;
   Eigen::Matrix3d R_ = Eigen::Matrix3d::Identity();
@@ -110,25 +105,15 @@ class PlaneView {
 Status for_each_hit(const TrackJob& job, const Trajectory& trajectory, int every,
                     const std::function<bool(double)>& progress, PlaneView& view,
                     const std::function<void(const PlaneView::Hit&)>& take) {
-  auto reader = open_events(job.recording, kPacket_s);
-  if (!reader) return reader.error();
-  EventPacket packet;
   TimeNs drawn = std::numeric_limits<TimeNs>::min();
-  const TimeNs first = trajectory.front().t, last = trajectory.back().t;
-  for (int number = 0;; ++number) {
-    const auto more = (*reader)->next(packet);
-    if (!more) return more.error();
-    if (!*more) return {};
-    if (number % every != 0) continue;
-    const TimeNs t = packet.time(packet.events[packet.events.size() / 2]);
-    if (t < first || t > last) continue;
-    const Pose T_map_cam = state_at(trajectory, t).nav.T_map_body * job.setup.T_body_cam;
-    if (drawn == std::numeric_limits<TimeNs>::min() || t - drawn >= kRedraw) view.look(T_map_cam), drawn = t;
-    view.move(T_map_cam);
-    for (const Event& e : packet.events)
-      if (const auto hit = view.hit(e.x, e.y)) take(*hit);
-    if (!progress(to_seconds(t - first) / std::max(1e-9, to_seconds(last - first)))) return {};
-  }
+  return for_each_packet(job, trajectory, every, progress,
+                         [&](TimeNs t, const Pose& T_map_cam, std::span<const Event> events) {
+                           if (drawn == std::numeric_limits<TimeNs>::min() || t - drawn >= kRedraw)
+                             view.look(T_map_cam), drawn = t;
+                           view.move(T_map_cam);
+                           for (const Event& e : events)
+                             if (const auto hit = view.hit(e.x, e.y)) take(*hit);
+                         });
 }
 
 /// Where a plane is seen, and how finely.
@@ -164,46 +149,6 @@ constexpr double kShortest_m = 0.05, kLongest_m = 0.12;
 constexpr double kShortest_px = 6;
 constexpr double kApart_px = 3;        // markings side by side
 constexpr double kFromContour_px = 3;  // from a contour of the map that runs beside it
-constexpr float kParallel = 0.9F;
-
-/// The map's contours by cubes of 5 cm, to find those that run beside a line.
-class ContourNeighbours {
- public:
-  explicit ContourNeighbours(const ContourMap& map) : map_(map) {
-    for (std::uint32_t i = 0; i < map.points.size(); ++i)
-      sorted_.emplace_back(key(map.points[i].position), i);
-    std::sort(sorted_.begin(), sorted_.end());
-  }
-  bool beside(const Eigen::Vector3f& p, const Eigen::Vector3f& tangent, float within_m) const {
-    const float reach = std::min(within_m, kCube_m);
-    for (int dx = -1; dx <= 1; ++dx)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dz = -1; dz <= 1; ++dz) {
-          const Key k = key(p + kCube_m * Eigen::Vector3f(static_cast<float>(dx), static_cast<float>(dy),
-                                                          static_cast<float>(dz)));
-          for (auto it = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair(k, std::uint32_t{0}));
-               it != sorted_.end() && it->first == k; ++it) {
-            const ContourPoint& c = map_.points[it->second];
-            if (std::abs(c.tangent.dot(tangent)) < kParallel) continue;
-            const Eigen::Vector3f d = c.position - p;
-            const float along = d.dot(tangent);
-            if (std::abs(along) < 0.03F && (d - along * tangent).norm() < reach) return true;
-          }
-        }
-    return false;
-  }
-
- private:
-  static constexpr float kCube_m = 0.05F;
-  using Key = std::array<std::int32_t, 3>;
-  static Key key(const Eigen::Vector3f& p) {
-    return {static_cast<std::int32_t>(std::floor(p.x() / kCube_m)),
-            static_cast<std::int32_t>(std::floor(p.y() / kCube_m)),
-            static_cast<std::int32_t>(std::floor(p.z() / kCube_m))};
-  }
-  const ContourMap& map_;
-  std::vector<std::pair<Key, std::uint32_t>> sorted_;
-};
 
 /// The points of one line; none if a contour of the map runs beside it.
 std::vector<ContourPoint> points_of(const PlaneEvents& plane, const RidgeLine& line, const ContourMap& map,
@@ -238,8 +183,9 @@ std::vector<ContourPoint> points_of(const PlaneEvents& plane, const RidgeLine& l
 
 Expected<std::vector<PlaneEvents>> events_on_planes(const TrackJob& job, const Trajectory& trajectory,
                                                     const std::function<bool(double)>& progress) {
-  PlaneView view(job);
   const auto& map = *job.map;
+  if (map.polygons.empty()) return std::vector<PlaneEvents>{};
+  PlaneView view(job);
   std::vector<Extent> extents(map.planes.size());
   for (std::size_t p = 0; p < extents.size(); ++p) {
     extents[p].right = view.normal(static_cast<int>(p)).unitOrthogonal();

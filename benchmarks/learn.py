@@ -9,6 +9,7 @@ import numpy as np
 
 import harness
 import tables
+import learnt_edges
 from changed_map import Contours, move_contours
 
 # One flight learns, others of the same place are tracked.
@@ -21,11 +22,18 @@ SPLIT = {"courtyard_landing": 2.4, "room_other_view": 1.5, "room_c": 0.65, "room
 
 # A changed scene: a fifth of the contours of the map that LEARNS has made are moved; then another flight learns. The
 # limits of silence were chosen with the first seed on the first flight.
-FAR_M = 0.03  # between a contour and the true one, if there is one
 CHANGED_SHARE, CHANGED = 0.2, [("room_people", 1), ("room_people", 2), ("room_720p", 3), ("room_720p", 4)]
 
 # One landing learns; another one in the same place is tracked from a height of so much until it touches down.
 LANDING_PLACE, LANDING_S, HEIGHT_M, DOWN_M = 421, 5, 1.5, 0.01
+
+# A flight before a landing pad with nested squares.
+PRINTS_PLACE, PRINTS_S = 423, 6
+PRINTS = ("world.pad_mark=squares", "trajectory.centre_z_m=2.5", "trajectory.size_forward_m=2", "trajectory.size_left_m=2",
+          "trajectory.size_up_m=1", "trajectory.speed_m_s=1")
+
+# A real board and desk, without an IMU.
+BOARD = "data/real/davis240b_checkerboard"
 
 # Simulated places that nobody has looked at: one flight learns, another with motion and noise of its own is tracked.
 FRESH, LEARNING_S, TRACKED_S = {"indoor_spiral": range(401, 406), "outdoor_spiral": range(406, 411)}, 10, 4
@@ -78,7 +86,7 @@ def measure_others(bench):
         learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
         tracked = {name: compare(bench, bench.peer(name).folder, bench.peer(name), scratch / "built.h5", learnt, scratch)
                    for name in TRACKED}
-        places = places_of_told(bench, learnt, scratch / "built.h5", teacher.contours, scratch)
+        places = learnt_edges.of_flight(bench, learnt, scratch / "built.h5", teacher.contours, scratch)
     return {"told": told, "tracked": tracked, "places": places}
 
 
@@ -115,6 +123,37 @@ def measure_landings(bench):
         return {"told": told, "tracked": compare(bench, scratch / "last", flight, scratch / "built.h5", learnt, scratch)}
 
 
+def measure_prints(bench):
+    """Markings on the pad's top beside what is printed there."""
+    settings = (*harness.TINY, "lidar.on=true", *harness.seeds(PRINTS_PLACE), *PRINTS)
+    teacher = bench.simulated("outdoor_spiral", PRINTS_S, settings, "learn_prints")
+    with bench.folder() as scratch:
+        bench.run("map", "build", teacher.folder / "map_raw.ply", "-o", scratch / "built.h5")
+        learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
+        return learnt_edges.beside_prints(learnt) if learnt else told
+
+
+def measure_board(bench, name, learns, tracks):
+    """A real flight that tells nothing, or what another one of the same desk is with what it told."""
+    folder = bench.shared / BOARD
+    with bench.folder() as scratch:
+        bench.run("map", "import", folder / learns / f"{name}.ply", "-o", scratch / "given.h5")
+        learnt, told = learn(bench, scratch / "given.h5", folder / learns, folder / learns / "groundtruth.tum", scratch)
+        maps = {"given": scratch / "given.h5", **({"learnt": learnt} if learnt else {})}
+        return {"told": told, **{kind: track(bench, folder / tracks, folder / tracks / "groundtruth.tum", path, scratch)
+                                 for kind, path in maps.items()}}
+
+
+def checkerboard_rows(bench):
+    rows = []
+    for name, what in (("contours", "board"), ("contours_scene", "board and desk")):
+        for learns, tracks in (("seq_0001", "seq_0002"), ("seq_0002", "seq_0001")):
+            m = bench.once(f"learn: real {name} {learns}", lambda n=name, a=learns, b=tracks: measure_board(bench, n, a, b))
+            rows.append([what, learns, m["told"].get("refused", "learnt"), tracks, cell(m["given"]),
+                         cell(m["learnt"]) if "learnt" in m else "-"])
+    return tables.table(["map", "learnt from", "what was said", "tracked", "given", "learnt"], rows)
+
+
 def measure_split(bench, recording, seconds):
     with bench.folder() as scratch:
         bench.run("map", "build", cloud_of(bench, recording), "-o", scratch / "built.h5")
@@ -139,23 +178,7 @@ def measure_fresh(bench, scenario, place):
         bench.run("map", "build", teacher.folder / "map_raw.ply", "-o", scratch / "built.h5")
         learnt, told = learn(bench, scratch / "built.h5", teacher.folder, teacher.truth, scratch)
         return {"told": told, "tracked": compare(bench, flight.folder, flight, scratch / "built.h5", learnt, scratch),
-                "places": places_of_told(bench, learnt, scratch / "built.h5", teacher.contours, scratch) if learnt else None}
-
-
-def places_of_told(bench, learnt, built, true, scratch):
-    """Of the built contours that the flight has told: distance across from the true ones, before and after, mm."""
-    bench.run("map", "import", true, "-o", scratch / "true.h5")
-    before, after, true = Contours(built), Contours(learnt), Contours(scratch / "true.h5")
-    told = after.part(after.told_in_place())
-    partner = told.beside(before, FAR_M)
-    was = before.part(partner[partner >= 0])
-    return {kind: distances(contours.across_mm(true, FAR_M)) for kind, contours in (("built", was), ("learnt", told))}
-
-
-def distances(values_mm):
-    found = sorted(v for v in values_mm if v is not None)
-    return {"mean": statistics.mean(found), "median": statistics.median(found), "p95": found[int(0.95 * len(found))],
-            "none": 1 - len(found) / len(values_mm)}
+                "places": learnt_edges.of_flight(bench, learnt, scratch / "built.h5", teacher.contours, scratch) if learnt else None}
 
 
 def fresh_summary(fresh):
@@ -209,22 +232,14 @@ def changed_row(name, seed, measured):
 
 def told_row(name, told):
     if "refused" in told:
-        return [name, "-", "-", "-", "refused", "-", "-", "-"]
+        return [name, "-", "-", "-", "-", "refused", "-", "-", "-"]
     sigma = ", ".join(f"{v:.1f}" for v in told["common_sigma_mm"])
     own = told["own"]
+    explained = ", ".join(f"{100 * told[f'explained_events_{when}']:.0f}" for when in ("before", "after"))
     return [name, f"{told['seconds']:.1f}", f"{told['view_spread_deg']:.1f}",
-            f"{told['moved_m']:.0f}, {told['struck_m']:.1f}, {told['new_m']:.0f}", sigma,
+            f"{told['moved_m']:.0f}, {told['struck_m']:.1f}, {told['new_m']:.0f}", explained, sigma,
             f"{own['ate_mean_mm']:.2f}, {own['are_mean_deg']:.3f}", f"{told['processor_s'] / told['seconds']:.1f}",
             f"{told['memory_mb']:.0f}"]
-
-
-def place_row(name, measured):
-    if not measured:
-        return [name, "refused", "-", "-"]
-    def words(m):
-        return f"{m['mean']:.2f}, {m['median']:.2f}, {m['p95']:.1f}"
-    return [name, words(measured["built"]), words(measured["learnt"]),
-            f"{100 * measured['built']['none']:.0f}, {100 * measured['learnt']['none']:.0f}"]
 
 
 def make(bench):
@@ -243,7 +258,7 @@ def make(bench):
     places = {LEARNS: others["places"], **{name: m["places"] for name, m in fresh.items()}}
     told = [told_row(LEARNS, others["told"]), *(told_row(name, m["told"]) for name, m in split.items()),
             told_row("landing", landings["told"])]
-    heads = ["flight", "s", "views deg apart", "moved, struck, new m", "common sigma mm", "own trajectory mm, deg",
+    heads = ["flight", "s", "views deg apart", "moved, struck, new m", "events explained, before and after, %", "common sigma mm", "own trajectory mm, deg",
              "processor s per s", "memory MB"]
     return bench.write_page("learn", {
         "other flights": tables.transposed(others["tracked"], cell),
@@ -251,8 +266,9 @@ def make(bench):
                                  [[names, ", ".join(f"{v:.1f}" for v in m["common_sigma_mm"]),
                                    *(cell(m["tracked"][name]) for name in TRACKED)] for names, m in in_a_row.items()]),
         "landings": tables.transposed({"another landing": landings["tracked"]}, cell),
-        "places": tables.table(["flight", "built: mean, median, p95 mm", "learnt", "none within 3 cm, built and learnt, %"],
-                               [place_row(name, m) for name, m in places.items()]),
+        "places": learnt_edges.moved_table(places), "new edges": learnt_edges.new_table(places),
+        "prints": learnt_edges.prints_table(bench.once("learn: prints", lambda: measure_prints(bench))),
+        "checkerboard": checkerboard_rows(bench),
         "second parts": tables.transposed({name: m["tracked"] for name, m in split.items()}, cell),
         "fresh places": [*tables.transposed({name: m["tracked"] for name, m in fresh.items()}, cell),
                          "| mean | " + " | ".join(fresh_summary(fresh).values()) + " |"],

@@ -10,8 +10,8 @@ import tables
 
 CLASSES = {"5 cm, 0.5 deg": 99, "10 cm, 2 deg": 98, "30 cm, 5 deg": 97, "50 cm, 10 deg": 95, "GPS-like": 90, "anywhere": 80}
 BUILT_LESS = 5  # per cent
-SEEDS, BUILT_SEEDS = 20, 5
-FLIGHTS, MOST_MEV_S, WIDTH = 3, 15, 640
+SEEDS, BUILT_SEEDS = 40, 5
+FLIGHTS, MOST_MEV_S, WIDTH = 6, 15, 640
 FOLDER_FILES = ("events.h5", "imu.csv", "imu.yaml", "groundtruth.tum", "contours.ply", "mesh.ply")
 
 

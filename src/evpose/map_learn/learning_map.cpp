@@ -13,6 +13,8 @@ namespace {
 
 // Of what a cloud's map says of a contour, beside the sigma that it states.
 constexpr double kContour_m = SegmentOffsetConfig{}.sigma_m;  // some stand on another edge, and count less
+// Of the errors of a contour's segments: measured in rooms; all of them together tell as much as their mean.
+constexpr double kCorrelation = 0.3;
 // Of a marking: nothing is known along its plane; across it some faces stand further off.
 constexpr double kAlongPlane_m = 0.1, kOffPlane_m = 1e-3;
 // What is not in the adjustment's covariance: light and shade beside an edge, a tangent that leans.
@@ -81,7 +83,26 @@ Landmark LearningMap::told_before(const Landmark& l, const Eigen::Vector3d& at, 
   return out;
 }
 
+namespace {
+
+/// Of each contour, by its number, into how many segments it is cut.
+std::vector<int> parts_of_contours(const ContourMap& map, const ContourSegments& segments,
+                                   std::int32_t contours) {
+  std::vector<int> out(static_cast<std::size_t>(contours), 0);
+  std::vector<bool> counted(segments.count, false);
+  for (std::size_t i = 0; i < map.points.size(); ++i) {
+    const std::uint32_t s = segments.of_point[i];
+    if (counted[s] || map.points[i].contour < 0) continue;
+    counted[s] = true;
+    ++out[static_cast<std::size_t>(map.points[i].contour)];
+  }
+  return out;
+}
+
+}  // namespace
+
 std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) const {
+  const std::vector<int> parts = parts_of_contours(map_, segments, next_contour());
   std::vector<Landmark> out(segments.count);
   std::vector<Eigen::Vector3d> moved(segments.count, Eigen::Vector3d::Zero()), tangent = moved,
                                                                                normal = moved, place = moved;
@@ -119,7 +140,9 @@ std::vector<Landmark> LearningMap::landmarks(const ContourSegments& segments) co
       l.sigma_m = record[s]->is_new ? Eigen::Vector2d(kAlongPlane_m, kOffPlane_m)
                                     : Eigen::Vector2d(stated, stated / kViewChange);
     } else {
-      const double across = std::hypot(stated, kContour_m);
+      const std::int32_t contour = example[s]->contour;
+      const int others = contour < 0 ? 0 : parts[static_cast<std::size_t>(contour)] - 1;
+      const double across = std::sqrt(1 + kCorrelation * others) * std::hypot(stated, kContour_m);
       l.sigma_m = {across, across};
     }
     l.moved_m = l.directions.transpose() * (moved[s] / points[s]);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 #include <cmath>
 
 namespace evpose::map_learn {
@@ -92,6 +94,29 @@ TEST(LearningMap, AnAppliedMoveIsHeldAgainstWhereTheContourWasGiven) {
   EXPECT_NEAR(landmarks[segments.of_point[0]].moved_m(0), 4e-3, 1e-6);
   EXPECT_NEAR(landmarks[segments.of_point[0]].sigma_m(0), std::hypot(3e-3, 6e-3), 1e-6);
   EXPECT_NEAR(landmarks[segments.of_point[10]].moved_m.norm(), 0, 1e-6);
+}
+
+TEST(LearningMap, ALongContourTellsAsMuchAsTheMeanOfItsCorrelatedSegments) {
+  ContourMap given = two_rims();
+  for (int i = 10; i < 120; ++i) {
+    ContourPoint p = given.points[0];
+    p.position.x() += 0.01F * static_cast<float>(i);
+    given.points.push_back(p);
+  }
+  const LearningMap map(given);
+  const ContourSegments segments = cut_into_segments(map.map());
+  const int n = static_cast<int>(segments.count) - 1;
+  ASSERT_GT(n, 7);
+  const auto landmarks = map.landmarks(segments);
+  const std::uint32_t short_one = segments.of_point[10];
+  double information = 0;
+  for (std::uint32_t s = 0; s < segments.count; ++s)
+    if (s != short_one) information += 1 / (landmarks[s].sigma_m(0) * landmarks[s].sigma_m(0));
+  constexpr double kCorrelation = 0.3;
+  const Eigen::MatrixXd covariance =
+      std::pow(landmarks[short_one].sigma_m(0), 2) *
+      (kCorrelation * Eigen::MatrixXd::Ones(n, n) + (1 - kCorrelation) * Eigen::MatrixXd::Identity(n, n));
+  EXPECT_NEAR(information / covariance.inverse().sum(), 1, 1e-9);
 }
 
 TEST(LearningMap, AContourThatWasDisplacedBeforehandGoesBackIfNothingIsSeenOfIt) {

@@ -3,6 +3,7 @@
 
 Each is seen askew from above. Creases blue, boundaries red, axes of round bodies orange; the planes' polygons are light
 grey, darker where several lie behind each other. Shadows are left out: they are many, and nothing is aligned to them.
+map_learnt.png is a shared room after a flight has learnt it: what was moved blue, markings green, depth edges red, what was not told grey.
 """
 import math
 import shutil
@@ -13,6 +14,9 @@ import numpy as np
 
 import drawing
 import harness
+import learn
+import learnt_edges
+from changed_map import MARKING, Contours
 from maps import REAL
 
 # Cloud, azimuth and elevation of the view in degrees.
@@ -21,6 +25,8 @@ VIEWS = {"hall": ("hall_lidar_4cm", 25, 35), "facade": ("campus_building_livox",
 WIDTH = 1000
 COLOURS = {1: "#0b5cad", 2: "#d43a4f", 4: "#e08e0b", 5: "#9aa5a0"}  # by kind of contour
 SHADOW = 5
+LEARNT_VIEW = (25, 45)
+MOVED, PRINTED, DEPTH, UNTOLD = "#0b5cad", "#2a9d4a", "#d43a4f", "#c3c9cc"
 
 
 def contours(path):
@@ -55,11 +61,23 @@ def projection(azimuth_deg, elevation_deg):
     return np.stack([right, -up], axis=1)
 
 
-def draw(path, azimuth_deg, elevation_deg):
+def learnt_colours(learnt, built):
+    """Of each contour of the learnt map."""
+    points = Contours(learnt)
+    first = np.unique(points.contour, return_index=True)[1]
+    told, printed = points.looks[first] > 0, points.kinds[first] == MARKING
+    new = points.part(first).beside(Contours(built), learnt_edges.FAR_M) < 0
+    return np.select([told & printed, told & new, told], [PRINTED, DEPTH, MOVED], UNTOLD)
+
+
+def draw(path, azimuth_deg, elevation_deg, colours=None):
+    """`colours`: of the contours; none: by their kinds."""
     begin, end, kind = contours(path)
     view = projection(azimuth_deg, elevation_deg)
     kept = kind != SHADOW
-    a, b, kind = begin[kept] @ view, end[kept] @ view, kind[kept]
+    if colours is None:
+        colours = np.array([COLOURS.get(k, "#444") for k in kind])
+    a, b, colours = begin[kept] @ view, end[kept] @ view, colours[kept]
     low, high = np.quantile(np.concatenate([a, b]), [0.005, 0.995], axis=0)
     scale = (WIDTH - 20) / max(high[0] - low[0], 1e-6)
     height = int(min(20 + scale * (high[1] - low[1]), 1.2 * WIDTH))
@@ -69,12 +87,19 @@ def draw(path, azimuth_deg, elevation_deg):
     for ring in polygons(path):
         svg.raw("<path d='M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in 10 + (ring @ view - low) * scale) + "Z'/>")
     svg.raw("</g>")
-    for p, q, k in zip(10 + (a - low) * scale, 10 + (b - low) * scale, kind):
-        svg.raw(f"<path d='M{p[0]:.1f} {p[1]:.1f}L{q[0]:.1f} {q[1]:.1f}' stroke='{COLOURS.get(k, '#444')}' "
-                "stroke-width='1.6'/>")
+    for p, q, colour in zip(10 + (a - low) * scale, 10 + (b - low) * scale, colours):
+        svg.raw(f"<path d='M{p[0]:.1f} {p[1]:.1f}L{q[0]:.1f} {q[1]:.1f}' stroke='{colour}' stroke-width='1.6'/>")
     svg.raw(f"<path d='M20 {height - 12}h{metre * scale:.1f}' stroke='#000' stroke-width='3'/>")
     svg.text(20, height - 18, f"{metre:g} m", size=13)
     return svg.content(), height
+
+
+def picture(bench, scratch, name, drawn):
+    svg, height = drawn
+    (scratch / "map.svg").write_text(svg)
+    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+                    f"--window-size={WIDTH},{height}", f"--screenshot={bench.image(f'map_{name}.png').resolve()}",
+                    f"file://{(scratch / 'map.svg').resolve()}"], check=True, capture_output=True)
 
 
 def make(bench):
@@ -85,9 +110,10 @@ def make(bench):
         with bench.folder() as scratch:
             words = ["import", source] if name == "sofa" else ["build", "--level", source, *REAL[cloud]]
             bench.run("map", *words, "-o", scratch / "map.h5")
-            svg, height = draw(scratch / "map.h5", azimuth_deg, elevation_deg)
-            (scratch / "map.svg").write_text(svg)
-            subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
-                            f"--window-size={WIDTH},{height}", f"--screenshot={bench.image(f'map_{name}.png').resolve()}",
-                            f"file://{(scratch / 'map.svg').resolve()}"], check=True, capture_output=True)
+            picture(bench, scratch, name, draw(scratch / "map.h5", azimuth_deg, elevation_deg))
+    with bench.folder() as scratch:
+        flight, built = bench.peer(learn.LEARNS), scratch / "built.h5"
+        bench.run("map", "build", learn.cloud_of(bench, flight), "-o", built)
+        learnt, _ = learn.learn(bench, built, flight.folder, flight.truth, scratch)
+        picture(bench, scratch, "learnt", draw(learnt, *LEARNT_VIEW, learnt_colours(learnt, built)))
     return bench.image("map_*.png")

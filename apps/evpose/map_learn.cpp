@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "evpose/core/log.h"
 #include "evpose/core/version.h"
 #include "evpose/io/files/atomic_file.h"
 #include "evpose/io/maps/contour_files.h"

@@ -15,13 +15,13 @@
 namespace evpose::map_learn {
 namespace {
 
-constexpr TimeNs kMask = 10 * kNsPerMs;  // between two drawings of the map's contours
-constexpr double kSpan_s = 0.01;         // over which their motion is taken; of no use here
-constexpr int kMasked_px = 3;            // to each side of a contour: its events are not swept
-constexpr double kWay = 0.1;             // of a sweep, in typical depths
+constexpr TimeNs kMaskEvery = 10 * kNsPerMs;  // between two drawings of the map's contours
+constexpr double kSpan_s = 0.01;              // over which their motion is taken; of no use here
+constexpr int kBeside_px = 3;                 // to each side of a contour: its events are not swept
+constexpr double kWay = 0.1;                  // of a sweep, in typical depths
 constexpr TimeNs kLongest = 2 * kNsPerS;
 constexpr double kLeastParallax_cells = 12;  // of a thing at the typical depth over a sweep
-constexpr double kWidth_cells = 500;         // of a reference view, at most: half a gigabyte with all slices
+constexpr double kWidth_cells = 500;         // of a reference view, at most: 70 MB with all slices
 constexpr double kGrazing =
     0.4;  // sine of the angle to the line of sight below which an edge's ends are not told
 constexpr int kLeastSlices = 8, kMostSlices = 96;
@@ -80,7 +80,7 @@ class FlightSweeper {
 void FlightSweeper::follow(TimeNs t) {
   for (; next_state_ < trajectory_.size() && trajectory_[next_state_].t <= t; ++next_state_)
     contours_.choose(trajectory_[next_state_].nav.T_map_body);
-  if (drawn_ && t - *drawn_ < kMask) return;
+  if (drawn_ && t - *drawn_ < kMaskEvery) return;
   drawn_ = t;
   draw_mask(state_at(trajectory_, t));
 }
@@ -92,8 +92,8 @@ void FlightSweeper::draw_mask(const FusionState& state) {
   for (const ContourSample& sample : contours_.samples()) {
     const int u = static_cast<int>(std::lround(sample.pixel.x())),
               v = static_cast<int>(std::lround(sample.pixel.y()));
-    for (int y = std::max(0, v - kMasked_px); y <= std::min(size.height - 1, v + kMasked_px); ++y)
-      for (int x = std::max(0, u - kMasked_px); x <= std::min(size.width - 1, u + kMasked_px); ++x)
+    for (int y = std::max(0, v - kBeside_px); y <= std::min(size.height - 1, v + kBeside_px); ++y)
+      for (int x = std::max(0, u - kBeside_px); x <= std::min(size.width - 1, u + kBeside_px); ++x)
         mask_[static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) +
               static_cast<std::size_t>(x)] = true;
   }
@@ -103,7 +103,7 @@ void FlightSweeper::draw_mask(const FusionState& state) {
 void FlightSweeper::begin_view(TimeNs t) {
   std::vector<double> depths;
   for (const ContourSample& sample : contours_.samples()) depths.push_back(sample.depth_m);
-  view_end_ = t + kMask;  // nothing of the map in view
+  view_end_ = t + kMaskEvery;  // nothing of the map in view
   if (depths.empty()) return;
   std::sort(depths.begin(), depths.end());
   const double typical = depths[depths.size() / 2];
@@ -113,7 +113,7 @@ void FlightSweeper::begin_view(TimeNs t) {
   const Eigen::Vector3d from = position(t);
   while (*view_end_ - t < kLongest && *view_end_ < trajectory_.back().t &&
          (position(*view_end_) - from).norm() < kWay * typical)
-    *view_end_ += kMask;
+    *view_end_ += kMaskEvery;
   T_map_view_ = state_at(trajectory_, t + (*view_end_ - t) / 2).nav.T_map_body * job_.setup.T_body_cam;
   T_view_map_ = T_map_view_.inverse();
   const double way = std::max((position(*view_end_) - T_map_view_.p).norm(), (from - T_map_view_.p).norm());

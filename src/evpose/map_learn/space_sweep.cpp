@@ -77,7 +77,7 @@ void SpaceSweep::add(const Eigen::Vector3d& centre, const Eigen::Vector3d& ray) 
   // Where the ray passes depth z: centre + (z - centre.z) way, which over z is linear in 1 / z.
   const Eigen::Vector2d way = ray.head<2>() / ray.z();
   const Eigen::Vector2d start = centre.head<2>() - centre.z() * way;
-  const Eigen::Vector2d half(width_ / 2 + 0.5, height_ / 2 + 0.5);
+  const Eigen::Vector2d half(0.5 * width_, 0.5 * height_);
   Eigen::Vector2d at = view_.focal_cells * (way + inverse_farthest_ * start) + half;
   const Eigen::Vector2d step = view_.focal_cells * inverse_step_ * start;
   for (int slice = 0; slice < view_.slices; ++slice, at += step) {
@@ -128,8 +128,8 @@ std::vector<SweptLine> SpaceSweep::take_lines() {
     if (!peak) continue;
     const auto place = [&](const Eigen::Vector2d& p, double slice) -> Eigen::Vector3d {
       const double depth = 1 / (inverse_farthest_ + slice * inverse_step_);
-      return depth * Eigen::Vector3d((p.x() - width_ / 2) / view_.focal_cells,
-                                     (p.y() - height_ / 2) / view_.focal_cells, 1);
+      return depth * Eigen::Vector3d((p.x() - 0.5 * (width_ - 1)) / view_.focal_cells,
+                                     (p.y() - 0.5 * (height_ - 1)) / view_.focal_cells, 1);
     };
     out.push_back({place(line.a, peak->slice_a), place(line.b, peak->slice_b),
                    peak->sigma_slices * inverse_step_, line.significance});

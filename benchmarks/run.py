@@ -38,7 +38,7 @@ BENCHMARKS = {
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
     "relocalization": ("experiments", "make_relocalization", "what cannot be tracked: other maps, mirrored ones, starts 3 m off, noise", "10 min"),
     "probability": ("probability", "make", "whether poses are right: what is told and what is; wants the flights of unseen", "40 min"),
-    "starts": ("starts", "make", "20 starts of each kind on shared and unseen recordings, 5 in maps of clouds; wants the flights of unseen", "60 min"),
+    "starts": ("starts", "make", "40 starts of each kind on shared and unseen recordings, 5 in maps of clouds; wants the flights of unseen", "2 h"),
     "kidnapping": ("experiments", "make_kidnapping", "live sessions whose data stop while the camera moves on", "5 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),
@@ -49,7 +49,7 @@ BENCHMARKS = {
     "calibrate": ("calibrate", "make", "calibrations from flights, from starts that are far off", "90 min"),
     "boards": ("boards", "make", "calibrations before printed boards, beside frames and OpenCV; wants cv2", "20 min"),
     "map": ("maps", "make", "maps built from clouds, and tracking with them", "15 min"),
-    "learn": ("learn", "make", "maps made better by flights, and tracking with them", "10 min"),
+    "learn": ("learn", "make", "maps made better by flights, and tracking with them", "30 min"),
     "map-scale": ("map_scale", "make", "time and memory of map building, up to 100 million points", "2 h"),
     "map-borders": ("map_borders", "make", "a flight across the borders of a map in tiles", "10 min"),
     "latency": ("latency", "make", "stages of an update on whole recordings, and at high rates", "3 min"),
@@ -65,7 +65,7 @@ BENCHMARKS = {
     "error-picture": ("error_picture", "make", "docs/images/fusion_error.svg", "10 s"),
     "landing-pictures": ("landing_pictures", "make", "docs/images/landing_*.png", "3 min"),
     "viewer-pictures": ("viewer_pictures", "make", "docs/images/viewer_*.png, report_*.png", "1 min"),
-    "map-pictures": ("map_pictures", "make", "docs/images/map_*.png", "2 min"),
+    "map-pictures": ("map_pictures", "make", "docs/images/map_*.png", "3 min"),
 }
 
 GROUPS = {"all": list(BENCHMARKS),

@@ -218,7 +218,7 @@ int learn(const LearnRequest& request) {
   if (!placement) return bad_input(placement.error());
   if (map->planes.empty() || map->polygons.empty())
     log_warning(
-        text(request.map, ": has no planes: no markings are learnt, contours are moved and struck out only"));
+        text(request.map, ": has no planes, on which markings are learnt; evpose map build finds them"));
   for (std::size_t i = 0; i < request.runs.size(); ++i)
     if (const auto run = map_learn::read_run_of(request.runs[i], request.recordings[i], request.map); !run)
       return bad_input(run.error());

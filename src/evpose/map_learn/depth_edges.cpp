@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include "evpose/map_learn/contour_neighbours.h"
@@ -22,12 +23,10 @@ constexpr double kWay = 0.1;                  // of a sweep, in typical depths
 constexpr TimeNs kLongest = 2 * kNsPerS;
 constexpr double kLeastParallax_cells = 12;  // of a thing at the typical depth over a sweep
 constexpr double kWidth_cells = 500;         // of a reference view, at most: 70 MB with all slices
-constexpr double kGrazing =
-    0.4;  // sine of the angle to the line of sight below which an edge's ends are not told
+constexpr double kGrazing = 0.4;             // sine of the angle to the line of sight: less tells no depth
 constexpr int kLeastSlices = 8, kMostSlices = 96;
-constexpr double kNear = 0.5,
-                 kFar = 1.3;              // of a sweep, in depths of the map's nearest and farthest twentieth
-constexpr std::size_t kMostEvents = 500;  // of a packet: 2 million a second
+constexpr double kNear = 0.5, kFar = 1.3;  // of a sweep, in depths of the nearest and farthest twentieth
+constexpr std::size_t kMostEvents = 500;   // of a packet: 2 million a second
 
 /// Sweeps along a flight, one after the other.
 class FlightSweeper {
@@ -240,11 +239,17 @@ std::vector<ContourPoint> points_of(const SweptPiece& piece, const Eigen::Vector
 constexpr float kOfRound = 1.3F, kRoundError_m = 0.01F;  // of a body's radius and beside it
 constexpr float kUpright = 0.95F, kBesideAxis_m = 0.1F;
 
+std::vector<ContourPoint> axes_of_round_bodies(const ContourMap& map) {
+  std::vector<ContourPoint> out;
+  std::copy_if(map.points.begin(), map.points.end(), std::back_inserter(out),
+               [](const ContourPoint& p) { return p.kind == ContourKind::cylinder_axis; });
+  return out;
+}
+
 /// The side of a round body is elsewhere from another place.
-bool is_side_of_round_body(const ContourPoint& p, const ContourMap& map) {
-  return std::any_of(map.points.begin(), map.points.end(), [&](const ContourPoint& axis) {
-    if (axis.kind != ContourKind::cylinder_axis || std::abs(axis.tangent.dot(p.tangent)) < kUpright)
-      return false;
+bool is_side_of_round_body(const ContourPoint& p, const std::vector<ContourPoint>& axes) {
+  return std::any_of(axes.begin(), axes.end(), [&](const ContourPoint& axis) {
+    if (std::abs(axis.tangent.dot(p.tangent)) < kUpright) return false;
     const Eigen::Vector3f d = p.position - axis.position;
     const float along = d.dot(axis.tangent);
     return std::abs(along) < kBesideAxis_m &&
@@ -285,13 +290,14 @@ Expected<std::vector<ContourPoint>> find_depth_edges(const TrackJob& job, const 
                                   });
   if (!ok) return ok.error();
   const ContourNeighbours neighbours(*job.map);
+  const std::vector<ContourPoint> axes = axes_of_round_bodies(*job.map);
   std::vector<ContourPoint> out;
   for (const SweptPiece& piece : shared_pieces(sweeper.pieces())) {
     const auto points = points_of(piece, job.map->anchor, first_contour);
     const auto beside = std::count_if(points.begin(), points.end(), [&](const ContourPoint& p) {
       const double within_m = std::max(kFromContour_m, piece.across_sigma_m);
       return neighbours.beside(p.position, p.tangent, static_cast<float>(within_m)) ||
-             is_side_of_round_body(p, *job.map);
+             is_side_of_round_body(p, axes);
     });
     if (2 * beside > static_cast<std::ptrdiff_t>(points.size())) continue;
     out.insert(out.end(), points.begin(), points.end());

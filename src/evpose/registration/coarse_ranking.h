@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -40,13 +41,15 @@ class CoarseScores {
   }
   void find_entries(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const;
   void fill_cell(const EdgeField& field, const Camera& camera, int column, int row, float seen_share);
+  std::uint8_t steps(float score) const;
 
   float cells_per_unit_;            ///< of the tangent of the angle to the optical axis
   float half_width_, half_height_;  ///< of the table, cells
   int columns_, rows_;
   float outside_score_;
-  std::vector<float> scores_;  ///< one table for each direction, with a rim of kTurns / 2 cells
-  std::vector<float> points_;  ///< six arrays: position and tangent
+  float lowest_;                      ///< score of a step of zero
+  std::vector<std::uint8_t> scores_;  ///< steps; one table for each direction, with a rim of kTurns / 2 cells
+  std::vector<float> points_;         ///< six arrays: position and tangent
   std::size_t count_ = 0;
   mutable std::vector<std::int32_t> entries_;  ///< where each point is seen; below zero: not in the table
 };

@@ -6,26 +6,26 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <random>
 
 #include "evpose/core/keep_different.h"
-#include "evpose/registration/coarse_ranking.h"
+#include "evpose/registration/guess_scorer.h"
 
 namespace evpose {
 namespace {
 
-constexpr int kGuesses = 6000;               // with 256 turns of each
-constexpr std::size_t kRefined = 64;         // of the guesses
-constexpr std::size_t kKept = 16;            // of the refined ones, for later slices to choose from
-constexpr double kSeenShare = 0.3;           // of the contours in view, motion makes so many visible
-constexpr double kOutsideScore = -0.3;       // of a point that has left the image: neither good nor bad
-constexpr double kCorrelatedPoints = 10;     // so many points share one error
-constexpr std::size_t kRefinedPoints = 250;  // enough to move a guess to its optimum
-constexpr int kIterations = 3;               // at each width of the kernel
-constexpr double kFirstReach_px = 4;         // of guesses: a wider one leaves them for texture
-constexpr double kLastReach_px = 3;          // of the refinement with all points
-constexpr double kNarrowing = 0.6;           // of the kernel, from width to width
-constexpr double kNarrowest_px = 1;          // the sharpness of the edges
+constexpr std::size_t kGuesses = 20000;  // with 256 turns of each
+constexpr std::size_t kByPrior = 5;      // one of so many has the prior's attitude if others are told
+constexpr std::size_t kRefined = 64;     // of the guesses
+constexpr std::size_t kKept = 16;        // of the refined ones, for later slices to choose from
+constexpr double kSeenShare = GuessScorer::kSeenShare, kOutsideScore = GuessScorer::kOutsideScore;
+constexpr double kCorrelatedPoints = 10;                    // so many points share one error
+constexpr std::size_t kRefinedPoints = 250;                 // enough to move a guess to its optimum
+constexpr int kIterations = 3;                              // at each width of the kernel
+constexpr double kFirstReach_px = 4;                        // of guesses: a wider one leaves them for texture
+constexpr double kFirstSteps_px = 10, kSecondSteps_px = 5;  // before each of the two
+constexpr double kLastReach_px = 3;                         // of the refinement with all points
+constexpr double kNarrowing = 0.6;                          // of the kernel, from width to width
+constexpr double kNarrowest_px = 1;                         // the sharpness of the edges
 constexpr double kConverged = 0.05;      // a step below this share of the kernel's width ends the iterations
 constexpr double kApart_px = 5;          // of those to refine: that far the turns and the refinement reach
 constexpr std::size_t kSeenPoints = 12;  // by which poses are told apart
@@ -33,19 +33,6 @@ constexpr double kDifferent_px = 1;      // poses that see the points nearer to 
 constexpr double kTypicalDepth_m = 3;    // turns metres into pixels where poses are compared
 constexpr double kNearest_m = 0.05;      // points nearer to the camera are not projected
 constexpr double kMargin_px = 2;         // the field is interpolated inside of this
-
-double uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
-
-/// By the Box-Muller transform: the same on every platform, unlike std::normal_distribution.
-Vector6d standard_normal(std::mt19937& random) {
-  Vector6d out;
-  for (int i = 0; i < 6; i += 2) {
-    const double r = std::sqrt(-2 * std::log(uniform(random))), angle = 2 * M_PI * uniform(random);
-    out(i) = r * std::cos(angle);
-    out(i + 1) = r * std::sin(angle);
-  }
-  return out;
-}
 
 struct Projection {
   Eigen::Vector2d pixel;
@@ -122,22 +109,15 @@ NormalEquations linearise(const SearchView& view, const Pose& pose, const Pose& 
 }
 
 /// Poses of the prior, each with its score. The prior itself is the first.
-std::vector<PoseGuess> draw_guesses(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
-                                    unsigned seed) {
-  std::mt19937 random(seed);
-  const Matrix6d root = covariance.llt().matrixL();
-  CoarseScores scores(view.field, view.camera, static_cast<float>(kSeenShare),
-                      static_cast<float>(kOutsideScore));
-  scores.set_points(view.points, prior.p);
-  const Pose T_cam_body = view.T_body_cam.inverse();
-  std::vector<PoseGuess> guesses(kGuesses);
-  for (PoseGuess& g : guesses) {
-    g.T_map_body = &g == guesses.data() ? prior : prior.plus(root * standard_normal(random));
-    const Pose T_map_cam = g.T_map_body * view.T_body_cam, T_cam_map = T_map_cam.inverse();
-    const auto best =
-        scores.best_turn(T_cam_map.rotation().cast<float>(), (T_cam_map * prior.p).cast<float>());
-    g.score = best.score;
-    g.T_map_body = Pose{(T_map_cam.q * so3::exp(best.turn)).normalized(), T_map_cam.p} * T_cam_body;
+std::vector<PoseGuess> draw_guesses(const PosePrior& prior, GuessScorer& scorer) {
+  const Matrix6d root = prior.covariance.llt().matrixL();
+  std::vector<PoseGuess> guesses{scorer.turned(prior.T_map_body)};
+  for (std::size_t i = 1; i < kGuesses; ++i) {
+    Pose T_map_body = prior.T_map_body.plus(root * standard_normal(scorer.random()));
+    if (!prior.attitudes.empty() && i % kByPrior != 0)
+      T_map_body.q = prior.attitudes[i % prior.attitudes.size()] *
+                     so3::exp(prior.attitude_sigma_rad * standard_normal(scorer.random()).head<3>());
+    guesses.push_back(scorer.turned(T_map_body));
   }
   return guesses;
 }
@@ -208,27 +188,28 @@ PoseGuess refine_pose(const SearchView& view, const Pose& from, const Matrix6d& 
   return {pose, score_pose(view, pose, EdgeSpread::fine)};
 }
 
-std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
-                                   unsigned seed) {
+std::vector<PoseGuess> search_pose(const SearchView& view, const PosePrior& prior, unsigned seed) {
   if (view.points.empty()) return {};
-  std::vector<PoseGuess> guesses = draw_guesses(view, prior, covariance, seed);
+  GuessScorer scorer(view, prior.T_map_body.p, seed);
+  std::vector<PoseGuess> guesses = draw_guesses(prior, scorer);
   const PoseGuess first = guesses.front();
   keep_seen_differently(guesses, kRefined, kApart_px, view);
   guesses.push_back(first);
-  const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());
+  const Matrix6d information = prior.covariance.ldlt().solve(Matrix6d::Identity());
   const double evidence = static_cast<double>(view.points.size()) / kCorrelatedPoints;
   const std::vector<SearchPoint> some = thinned(view.points, kRefinedPoints);
   const SearchView coarse{view.field, view.camera, view.T_body_cam, some};
-  const auto refine = [&](const SearchView& seen, double from_px) {
+  const auto refine = [&](const SearchView& seen, double steps_px, double from_px) {
     for (PoseGuess& g : guesses) {
+      scorer.improve(g, steps_px);
       g = refine_pose(seen, g.T_map_body, information, from_px);
-      const Vector6d off = g.T_map_body.minus(prior);
+      const Vector6d off = g.T_map_body.minus(prior.T_map_body);
       g.score -= 0.5 * off.dot(information * off) / evidence;
     }
     keep_seen_differently(guesses, kKept, kDifferent_px, view);
   };
-  refine(coarse, kFirstReach_px);
-  refine(view, kLastReach_px);
+  refine(coarse, kFirstSteps_px, kFirstReach_px);
+  refine(view, kSecondSteps_px, kLastReach_px);
   return guesses;
 }
 

@@ -32,12 +32,21 @@ struct PoseGuess {
   double score = 0;
 };
 
+/// What is known of the pose before.
+struct PosePrior {
+  Pose T_map_body;
+  Matrix6d covariance;  ///< perturbed as Pose::plus
+  /// R_map_body by other means, from which most poses are drawn, if any; within this of the true one, 1
+  /// sigma.
+  std::vector<Eigen::Quaterniond> attitudes = {};
+  double attitude_sigma_rad = 0;
+};
+
 /// Coarse search (design.md 5.6 and 5.9): poses are drawn from the prior and compared by how many contours
-/// lie on edges of their direction. The best are refined by iterated least squares from a wide kernel to a
-/// narrow one. Contours in textured places count little, as an edge is near there at any pose. Returns the
-/// best poses that differ, best first. `covariance` is of `prior`, perturbed as Pose::plus.
-std::vector<PoseGuess> search_pose(const SearchView& view, const Pose& prior, const Matrix6d& covariance,
-                                   unsigned seed);
+/// lie on edges of their direction. The best are moved on by small random steps, then by iterated least
+/// squares from a wide kernel to a narrow one. Contours in textured places count little, as an edge is near
+/// there at any pose. Returns the best poses that differ, best first.
+std::vector<PoseGuess> search_pose(const SearchView& view, const PosePrior& prior, unsigned seed);
 
 /// Moves a pose to the optimum near by; contours may be up to `from_px` away from their edges. The prior
 /// holds the directions that the contours leave open.

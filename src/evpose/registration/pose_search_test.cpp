@@ -155,16 +155,29 @@ TEST_F(PoseSearchLaws, ThePoseIsFoundFromAWidePrior) {
   d << 0.1, -0.1, 0.08, 0.03, -0.04, 0.02;
   sigma << 0.1, 0.1, 0.1, 0.04, 0.04, 0.04;
   const Matrix6d covariance = sigma.cwiseAbs2().asDiagonal();
-  const auto found = search_pose(view(), Pose{}.plus(d), covariance, 1);
+  const auto found = search_pose(view(), {Pose{}.plus(d), covariance}, 1);
   ASSERT_FALSE(found.empty());
   EXPECT_LT(found[0].T_map_body.p.norm(), 0.01);
   EXPECT_LT(so3::log(found[0].T_map_body.q).norm(), 0.005);
   for (const PoseGuess& g : found) EXPECT_LE(g.score, found[0].score);
 }
 
+TEST_F(PoseSearchLaws, AttitudesThatAreToldMakeUpForAPriorThatIsFarOff) {
+  Vector6d d, sigma;
+  d << 0.1, -0.1, 0.08, 0.5, -0.4, 0.6;
+  sigma << 0.1, 0.1, 0.1, 0.5, 0.5, 0.5;
+  const PosePrior prior{Pose{}.plus(d), sigma.cwiseAbs2().asDiagonal()};
+  PosePrior told = prior;
+  told.attitudes = {so3::exp({0.8, 0, 0}), so3::exp({0.01, -0.01, 0.005})};
+  told.attitude_sigma_rad = 0.015;
+  EXPECT_GT(search_pose(view(), prior, 1).at(0).T_map_body.p.norm(), 0.05);
+  EXPECT_LT(search_pose(view(), told, 1).at(0).T_map_body.p.norm(), 0.01);
+}
+
 TEST_F(PoseSearchLaws, TheSameSeedGivesTheSamePoses) {
   const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
-  const auto a = search_pose(view(), Pose{}, covariance, 5), b = search_pose(view(), Pose{}, covariance, 5);
+  const auto a = search_pose(view(), {Pose{}, covariance}, 5),
+             b = search_pose(view(), {Pose{}, covariance}, 5);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].T_map_body.p, b[i].T_map_body.p);
 }

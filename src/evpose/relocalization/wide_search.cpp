@@ -23,9 +23,9 @@ constexpr double kSame_m = 0.03, kSame_rad = 0.015;          // after it
 constexpr double kAttitudeSigma_rad = 0.02;                  // of an attitude by lines
 constexpr double kPlaceSigma = 0.15;                         // of a position among places, in edges of these
 constexpr double kLastReach_px = 3;
-constexpr double kAbove_px = 100;                     // 1 sigma
+constexpr double kAbove_rad = 0.35;                   // in the image, 1 sigma
 constexpr double kBeside_m = 0.5, kBesideSigmas = 1;  // of the first prior, places are known, too
-constexpr double kTypicalDepth_m = 3;                 // turns metres into pixels
+constexpr double kTypicalDepth_m = 3;                 // turns metres into angles
 constexpr double kReach = 0.03;                       // of the first refinement, tangent units
 constexpr std::size_t kComparedPoints = 500;          // at most, in the first refinement
 constexpr double kNearest_m = 0.2;                    // from the camera
@@ -48,10 +48,9 @@ auto nearer_than(double apart_m, double apart_rad) {
 
 }  // namespace
 
-bool WideSearch::suits(const Matrix6d& covariance, const Camera& camera) {
+bool WideSearch::suits(const Matrix6d& covariance) {
   const Eigen::Vector3d p = covariance.diagonal().head<3>(), r = covariance.diagonal().tail<3>();
-  return camera.focal_px() * (std::sqrt(p.maxCoeff()) / kTypicalDepth_m + std::sqrt(r.maxCoeff())) >
-         kAbove_px;
+  return std::sqrt(p.maxCoeff()) / kTypicalDepth_m + std::sqrt(r.maxCoeff()) > kAbove_rad;
 }
 
 WideSearch::WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible,

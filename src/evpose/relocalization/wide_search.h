@@ -29,7 +29,7 @@ class WideSearch {
  public:
   /// A prior by which contours may be far off in the image is searched here: the guesses of search_pose() are
   /// too few.
-  static bool suits(const Matrix6d& covariance, const Camera& camera);
+  static bool suits(const Matrix6d& covariance);
 
   /// The references outlive it.
   WideSearch(const ContourIndex& index, const Camera& camera, const VisibleSetConfig& visible,

@@ -77,6 +77,7 @@ void describe(ConfigTable& table, RelocalizationConfig& c) {
 Relocalizer::Workspace::Workspace(const RelocalizerScene& scene, const HypothesisMotion& motion)
     : field(scene.camera.size()),
       visible(scene.index, scene.camera, points_to_search(scene.visible)),
+      attitudes(scene.index.map(), scene.camera),
       refiner(scene, motion) {}
 
 Relocalizer::Relocalizer(const RelocalizerScene& scene)
@@ -95,7 +96,7 @@ void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& 
   velocity_sigma_m_s_ = kUnknownVelocitySigma_m_s;
   restart_search(t);
   searches_ = draws_ = 0;
-  workspace_->widely = motion_.has_imu() && WideSearch::suits(covariance, scene_.camera);
+  workspace_->widely = motion_.has_imu() && WideSearch::suits(covariance);
   if (!workspace_->widely) return;
   if (!workspace_->wide)
     workspace_->wide.emplace(scene_.index, scene_.camera, scene_.visible,
@@ -197,12 +198,17 @@ SearchView Relocalizer::view_from(const Pose& T_map_body, const Pose& T_body_cam
 void Relocalizer::search_around_prior(const Pose& T_body_cam, double age_s) {
   const double widening =
       std::pow(kWidening, std::clamp(searches_ - kSearchesOfFirstWidth, 0, kMostWidenings));
-  Matrix6d covariance = widening * widening * prior_covariance_;
-  covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(velocity_sigma_m_s_ * elapsed_s_, 2);
+  PosePrior prior{prior_.T_map_body, widening * widening * prior_covariance_};
+  prior.covariance.topLeftCorner<3, 3>().diagonal().array() += std::pow(velocity_sigma_m_s_ * elapsed_s_, 2);
   const SearchView view = view_from(prior_.T_map_body, T_body_cam);
   if (view.points.empty()) return;
-  for (const PoseGuess& guess :
-       search_pose(view, prior_.T_map_body, covariance, static_cast<unsigned>(++draws_)))
+  const Eigen::Matrix3d of_attitude = prior.covariance.bottomRightCorner<3, 3>();
+  if (AttitudeFinder::suits(of_attitude)) {
+    prior.attitudes =
+        workspace_->attitudes.find(workspace_->compensated, T_body_cam.q, prior_.T_map_body.q, of_attitude);
+    prior.attitude_sigma_rad = AttitudeFinder::kSigma_rad;
+  }
+  for (const PoseGuess& guess : search_pose(view, prior, static_cast<unsigned>(++draws_)))
     add_hypothesis(guess, prior_.velocity, T_body_cam, age_s);
 }
 

@@ -10,6 +10,7 @@
 #include "evpose/imu/strapdown.h"
 #include "evpose/map/visible_set.h"
 #include "evpose/registration/pose_search.h"
+#include "evpose/relocalization/attitude_finder.h"
 #include "evpose/relocalization/wide_search.h"
 #include "evpose/tracker/event_slice.h"
 #include "evpose/tracker/hypothesis_refiner.h"
@@ -84,7 +85,8 @@ class Relocalizer {
   struct Workspace {
     explicit Workspace(const RelocalizerScene& scene, const HypothesisMotion& motion);
     EdgeField field;
-    VisibleSet visible;              ///< points for the edges
+    VisibleSet visible;  ///< points for the edges
+    AttitudeFinder attitudes;
     PlaceCache places;               ///< where the scene has none
     std::optional<WideSearch> wide;  ///< once a prior has asked for it
     bool widely = false;             ///< this search is one by `wide`

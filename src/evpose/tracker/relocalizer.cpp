@@ -41,6 +41,7 @@ constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
 constexpr double kLeastLead = 1.15;       // over the next pose, in support
+constexpr double kRivalLead = 1.5;        // over one that is concentrated, too
 constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
 constexpr double kClearLead = 2,
                  kAloneConcentration = 0.22;  // so far ahead, that much is enough; evenly spread: 0.15
@@ -341,16 +342,20 @@ bool Relocalizer::explains_enough(const PoseHypothesis& h) const {
 }
 
 bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
-  const auto rival = std::ranges::find_if(
-      hypotheses_, [&](const PoseHypothesis& h) { return are_apart(h.nav.T_map_body, best.nav.T_map_body); });
   if (!explains_enough(best)) return false;
   const bool compete = wants_more_searches();
   if (compete && (slices_ < kLastCompeting || best.found < kFoundBy)) return false;
-  const double rival_support = rival == hypotheses_.end() ? 0 : rival->mean_support;
+  const auto leads = [&](const PoseHypothesis& h, double least) {
+    return !are_apart(h.nav.T_map_body, best.nav.T_map_body) || best.mean_support >= least * h.mean_support;
+  };
   const bool concentrated =
-      best.mean_concentration >= kLeastConcentration && best.mean_support >= kLeastLead * rival_support;
+      best.mean_concentration >= kLeastConcentration &&
+      std::ranges::all_of(hypotheses_, [&](const PoseHypothesis& h) {
+        return leads(h, h.mean_concentration < kLeastConcentration ? kLeastLead : kRivalLead);
+      });
   const bool alone =
-      best.mean_concentration >= kAloneConcentration && best.mean_support >= kClearLead * rival_support;
+      best.mean_concentration >= kAloneConcentration &&
+      std::ranges::all_of(hypotheses_, [&](const PoseHypothesis& h) { return leads(h, kClearLead); });
   return concentrated || (alone && !compete);
 }
 
@@ -359,7 +364,7 @@ std::vector<Pose> Relocalizer::candidates() const {
   if (slices_ < kLeastSlices) return out;
   for (const PoseHypothesis& h : hypotheses_) {
     const bool alike = explains_enough(h) && h.mean_concentration >= kLeastConcentration &&
-                       kLeastLead * h.mean_support > hypotheses_.front().mean_support;
+                       kRivalLead * h.mean_support > hypotheses_.front().mean_support;
     const bool apart =
         std::ranges::all_of(out, [&](const Pose& T) { return are_apart(h.nav.T_map_body, T); });
     if (alike && apart) out.push_back(h.nav.T_map_body);

@@ -12,6 +12,7 @@ constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consist
 constexpr double kPatienceWithGiven_s = 1;  // with one that was given, in a map that states errors
 constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
 constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
+constexpr double kContestedShare = 0.5;     // of time in which one direction of contours does not agree
 constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
 constexpr double kContested_s = 0.2;  // of a pose that was verified: one direction may pass without events
 constexpr double kHopeless_s = 1;     // without a search
@@ -89,6 +90,7 @@ void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   // In texture one direction may go without clearly more events for a while, of right poses and of wrong
   // ones.
   const bool waits = verdict == PoseVerdict::contested && verifying() && !map_may_be_wrong_;
+  if (waits && probability_.is_believed()) confirmed_s_ += kContestedShare * confirming_s;
   if (verdict != PoseVerdict::confirmed && !waits) confirmed_s_ = 0;
   contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
   // Some of the contours that are built of a cloud are where nothing is.

@@ -6,9 +6,9 @@
 namespace evpose {
 namespace {
 
-constexpr int kRounds = 2, kDraws = 60;  // of each round
-constexpr double kNarrowing = 0.5;       // of the steps, from round to round
-constexpr double kTypicalDepth_m = 3;    // turns pixels into metres
+constexpr int kDraws = 120;
+constexpr double kNarrowing = 0.98;    // of the steps, from one to the next: to a tenth
+constexpr double kTypicalDepth_m = 3;  // turns pixels into metres
 
 double uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
 
@@ -45,15 +45,12 @@ PoseGuess GuessScorer::turned(const Pose& T_map_body) const {
 
 void GuessScorer::improve(PoseGuess& guess, double reach_px) {
   guess = turned(guess.T_map_body);
-  for (int round = 0; round < kRounds; ++round, reach_px *= kNarrowing) {
-    const Pose from = guess.T_map_body;
-    for (int draw = 0; draw < kDraws; ++draw) {
-      Vector6d step = standard_normal(random_);
-      step.head<3>() *= reach_px / focal_px_ * kTypicalDepth_m;
-      step.tail<3>() *= reach_px / half_width_px_;
-      const PoseGuess other = turned(from.plus(step));
-      if (other.score > guess.score) guess = other;
-    }
+  for (int draw = 0; draw < kDraws; ++draw, reach_px *= kNarrowing) {
+    Vector6d step = standard_normal(random_);
+    step.head<3>() *= reach_px / focal_px_ * kTypicalDepth_m;
+    step.tail<3>() *= reach_px / half_width_px_;
+    const PoseGuess other = turned(guess.T_map_body.plus(step));
+    if (other.score > guess.score) guess = other;
   }
 }
 

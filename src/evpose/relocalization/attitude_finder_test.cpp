@@ -32,7 +32,7 @@ class AttitudeFinderLaws : public ::testing::Test {
       for (double s = 0; s <= length; ++s) {
         const Eigen::Vector2d at = line.from + s / length * (line.to - line.from);
         add(at.x(), at.y());
-        if (random() % 4 == 0) add(random() % 320, random() % 240);
+        if (random() % 4 == 0) add(static_cast<double>(random() % 320), static_cast<double>(random() % 240));
       }
     }
     return out;

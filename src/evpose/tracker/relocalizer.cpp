@@ -41,7 +41,8 @@ constexpr int kLeastSlices = 4;  // before a pose is accepted
 constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
 constexpr double kLeastLead = 1.15;       // over the next pose, in support
-constexpr double kRivalLead = 1.5;        // over one that is concentrated, too
+constexpr double kRivalLead = 1.5;        // over one that is concentrated, too,
+constexpr int kRivalSlices = 12;          // for so long: it may not have come to its place
 constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
 constexpr double kClearLead = 2,
                  kAloneConcentration = 0.22;  // so far ahead, that much is enough; evenly spread: 0.15
@@ -64,6 +65,11 @@ VisibleSetConfig points_to_search(VisibleSetConfig config) {
 bool are_apart(const Pose& a, const Pose& b) {
   const Vector6d d = a.minus(b);
   return d.head<3>().norm() >= kRival_m || d.tail<3>().norm() >= kRival_rad;
+}
+
+double lead_over(const PoseHypothesis& other, int slices) {
+  const bool may_be_right = other.mean_concentration >= kLeastConcentration;
+  return may_be_right && slices < kRivalSlices ? kRivalLead : kLeastLead;
 }
 
 }  // namespace
@@ -342,21 +348,17 @@ bool Relocalizer::explains_enough(const PoseHypothesis& h) const {
 }
 
 bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
-  if (!explains_enough(best)) return false;
   const bool compete = wants_more_searches();
-  if (compete && (slices_ < kLastCompeting || best.found < kFoundBy)) return false;
-  const auto leads = [&](const PoseHypothesis& h, double least) {
-    return !are_apart(h.nav.T_map_body, best.nav.T_map_body) || best.mean_support >= least * h.mean_support;
-  };
-  const bool concentrated =
-      best.mean_concentration >= kLeastConcentration &&
-      std::ranges::all_of(hypotheses_, [&](const PoseHypothesis& h) {
-        return leads(h, h.mean_concentration < kLeastConcentration ? kLeastLead : kRivalLead);
-      });
-  const bool alone =
-      best.mean_concentration >= kAloneConcentration &&
-      std::ranges::all_of(hypotheses_, [&](const PoseHypothesis& h) { return leads(h, kClearLead); });
-  return concentrated || (alone && !compete);
+  const bool too_early = compete && (slices_ < kLastCompeting || best.found < kFoundBy);
+  if (too_early || !explains_enough(best)) return false;
+  bool leads = best.mean_concentration >= kLeastConcentration;
+  bool alone = best.mean_concentration >= kAloneConcentration && !compete;
+  for (const PoseHypothesis& h : hypotheses_) {
+    if (!are_apart(h.nav.T_map_body, best.nav.T_map_body)) continue;
+    leads &= best.mean_support >= lead_over(h, slices_) * h.mean_support;
+    alone &= best.mean_support >= kClearLead * h.mean_support;
+  }
+  return leads || alone;
 }
 
 std::vector<Pose> Relocalizer::candidates() const {
@@ -364,7 +366,7 @@ std::vector<Pose> Relocalizer::candidates() const {
   if (slices_ < kLeastSlices) return out;
   for (const PoseHypothesis& h : hypotheses_) {
     const bool alike = explains_enough(h) && h.mean_concentration >= kLeastConcentration &&
-                       kRivalLead * h.mean_support > hypotheses_.front().mean_support;
+                       lead_over(h, slices_) * h.mean_support > hypotheses_.front().mean_support;
     const bool apart =
         std::ranges::all_of(out, [&](const Pose& T) { return are_apart(h.nav.T_map_body, T); });
     if (alike && apart) out.push_back(h.nav.T_map_body);

@@ -33,8 +33,7 @@ constexpr std::size_t kRefined = 6;    // best ones, by single events: these tak
 constexpr int kSlicesWithEdges = 2;    // then only those that were refined go on, by single events alone
 constexpr double kHopefulShare = 0.5;  // of the best one's support, with which one goes on
 constexpr double kNewestWeight = 0.4;  // of the newest slice in the means
-constexpr double kLeastStep_s = 1e-3;  // shorter ones tell no rate
-constexpr double kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
+constexpr double kLeastStep_s = 1e-3, kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
 
 // Acceptance. Wrong poses reach the concentration of the true one, not its support.
 constexpr int kLeastSlices = 4;  // before a pose is accepted

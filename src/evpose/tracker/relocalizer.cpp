@@ -41,10 +41,9 @@ constexpr int kMostSlices = 10;  // then the search starts anew
 constexpr double kLeastConcentration = 0.42;
 constexpr double kLeastLead = 1.15;       // over the next pose, in support
 constexpr double kRivalLead = 1.5;        // over one that is concentrated, too,
-constexpr int kRivalSlices = 12;          // for so long: it may not have come to its place
+constexpr int kRivalSlices = 12;          // so soon it may not have come to its place; in a true map
 constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
-constexpr double kClearLead = 2,
-                 kAloneConcentration = 0.22;  // so far ahead, that much is enough; evenly spread: 0.15
+constexpr double kClearLead = 2, kAloneConcentration = 0.22;  // so far ahead, that is enough; even: 0.15
 constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
 
 // Searches that compete, each in events of its own: a pose is believed that several of them have found.
@@ -66,9 +65,8 @@ bool are_apart(const Pose& a, const Pose& b) {
   return d.head<3>().norm() >= kRival_m || d.tail<3>().norm() >= kRival_rad;
 }
 
-double lead_over(const PoseHypothesis& other, int slices) {
-  const bool may_be_right = other.mean_concentration >= kLeastConcentration;
-  return may_be_right && slices < kRivalSlices ? kRivalLead : kLeastLead;
+double lead_over(const PoseHypothesis& other, bool soon) {
+  return soon && other.mean_concentration >= kLeastConcentration ? kRivalLead : kLeastLead;
 }
 
 }  // namespace
@@ -350,11 +348,12 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
   const bool compete = wants_more_searches();
   const bool too_early = compete && (slices_ < kLastCompeting || best.found < kFoundBy);
   if (too_early || !explains_enough(best)) return false;
+  const bool soon = slices_ < kRivalSlices && !map_may_be_wrong_;
   bool leads = best.mean_concentration >= kLeastConcentration;
   bool alone = best.mean_concentration >= kAloneConcentration && !compete;
   for (const PoseHypothesis& h : hypotheses_) {
     if (!are_apart(h.nav.T_map_body, best.nav.T_map_body)) continue;
-    leads &= best.mean_support >= lead_over(h, slices_) * h.mean_support;
+    leads &= best.mean_support >= lead_over(h, soon) * h.mean_support;
     alone &= best.mean_support >= kClearLead * h.mean_support;
   }
   return leads || alone;
@@ -363,9 +362,10 @@ bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
 std::vector<Pose> Relocalizer::candidates() const {
   std::vector<Pose> out;
   if (slices_ < kLeastSlices) return out;
+  const bool soon = slices_ < kRivalSlices && !map_may_be_wrong_;
   for (const PoseHypothesis& h : hypotheses_) {
     const bool alike = explains_enough(h) && h.mean_concentration >= kLeastConcentration &&
-                       lead_over(h, slices_) * h.mean_support > hypotheses_.front().mean_support;
+                       lead_over(h, soon) * h.mean_support > hypotheses_.front().mean_support;
     const bool apart =
         std::ranges::all_of(out, [&](const Pose& T) { return are_apart(h.nav.T_map_body, T); });
     if (alike && apart) out.push_back(h.nav.T_map_body);

@@ -61,7 +61,8 @@ struct PoorStart {
     };
     t_s = 0.05 + 1.1 * uniform();
     Vector6d error;
-    error << kPositionError_m * direction(), kRotationError_rad * direction();
+    error.head<3>() = kPositionError_m * direction();
+    error.tail<3>() = kRotationError_rad * direction();
     T_map_body = pose_at(t_s).plus(error);
   }
   double t_s;

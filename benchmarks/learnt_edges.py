@@ -33,7 +33,7 @@ def of_flight(bench, learnt, built, true, scratch):
 
 
 def correlation(built, true):
-    """Of the errors across a contour, of two of its segments, as far as these are within a centimetre."""
+    """Of the errors across a contour, of two of its segments, as far as these are within a centimetre; nan without two."""
     partner = built.beside(true, NEAR_M)
     ways = true.places[partner] - built.places
     ways -= (ways * built.tangents).sum(1)[:, None] * built.tangents
@@ -44,9 +44,11 @@ def correlation(built, true):
         own = np.flatnonzero((built.contour == number) & good)
         segment = (np.cumsum(built.lengths[own]) / SEGMENT_M).astype(int)
         contours.append(np.array([off[own[segment == k]].mean() for k in np.unique(segment)]))
+    pairs = sum(len(c) * (len(c) - 1) for c in contours)
+    if not pairs:
+        return float("nan")
     every = np.concatenate(contours)
     contours = [c - every.mean() for c in contours]
-    pairs = sum(len(c) * (len(c) - 1) for c in contours)
     return float(sum(c.sum() ** 2 - (c ** 2).sum() for c in contours) / pairs / every.var())
 
 

@@ -3,9 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -26,9 +25,7 @@ GateSums& GateSums::operator*=(double share) {
 }
 
 void ContourTrust::rearrange(std::span<const std::uint32_t> before) {
-  const std::vector<Segment> old = std::exchange(segments_, std::vector<Segment>(before.size()));
-  for (std::size_t i = 0; i < before.size(); ++i)
-    if (before[i] != ContrastMemory::kNew) segments_[i] = old[before[i]];
+  segments_ = rearranged(segments_, before);
 }
 
 void ContourTrust::add(std::uint32_t segment, const GateSums& sums) {

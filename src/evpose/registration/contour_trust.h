@@ -28,7 +28,7 @@ class ContourTrust {
  public:
   explicit ContourTrust(std::uint32_t segments) : segments_(segments) {}
 
-  /// The segments are others now: `before` has the number that each had, or ContrastMemory::kNew.
+  /// The segments are others now; see rearranged().
   void rearrange(std::span<const std::uint32_t> before);
   /// Time passes: what was seen before counts less.
   void advance(double span_s) { now_s_ += span_s; }

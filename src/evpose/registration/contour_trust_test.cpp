@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -58,7 +58,7 @@ TEST(ContourTrust, IsKeptWhereTheMapsSegmentsAreOthers) {
   trust.add(0, events(2000, 0, random));
   trust.add(1, events(2000, kCommon, random));
   const double wrong = trust.trust(0, kCommon), right = trust.trust(1, kCommon);
-  trust.rearrange(std::vector<std::uint32_t>{1, ContrastMemory::kNew, 0});
+  trust.rearrange(std::vector<std::uint32_t>{1, kNewSegment, 0});
   EXPECT_EQ(trust.trust(0, kCommon), right);
   EXPECT_EQ(trust.trust(1, kCommon), 1);
   EXPECT_EQ(trust.trust(2, kCommon), wrong);

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -30,12 +31,9 @@ void ContrastMemory::seed(std::uint32_t segment, int sign) {
 }
 
 void ContrastMemory::rearrange(std::span<const std::uint32_t> before, std::span<const int> map_contrast) {
-  const std::vector<Segment> old = std::exchange(segments_, std::vector<Segment>(before.size()));
+  segments_ = rearranged(segments_, before);
   for (std::uint32_t i = 0; i < segments_.size(); ++i)
-    if (before[i] != kNew)
-      segments_[i] = old[before[i]];
-    else
-      seed(i, -map_contrast[i]);
+    if (before[i] == kNewSegment) seed(i, -map_contrast[i]);
 }
 
 void ContrastMemory::sweep(std::uint32_t segment, double area_px2) {

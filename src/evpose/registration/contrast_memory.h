@@ -20,9 +20,8 @@ class ContrastMemory {
 
   /// What the map says of a step's sign, -1, 0 or +1 as steps(). It counts until events have told more.
   void seed(std::uint32_t segment, int sign);
-  /// The segments are those of another part of the map from now on: number i was `before[i]`, or is
-  /// new; `map_contrast[i]`: what the map says of it, as ContourPoint::contrast.
-  static constexpr std::uint32_t kNew = ~0U;
+  /// The segments are those of another part of the map from now on; see rearranged(). `map_contrast[i]`: what
+  /// the map says of one, as ContourPoint::contrast.
   void rearrange(std::span<const std::uint32_t> before, std::span<const int> map_contrast);
   /// The segment has swept so much of the image.
   void sweep(std::uint32_t segment, double area_px2);

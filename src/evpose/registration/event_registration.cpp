@@ -108,14 +108,13 @@ double EventRegistration::gate_of(const ContourSample& s) const {
 }
 
 /// Gate, edge delay, weight and excluded polarities of one sample.
-EventRule EventRegistration::rule_of(const ContourSample& s, double pose_variance) const {
+EventRule EventRegistration::rule_of(const ContourSample& s, double share, const EdgeDelay& delay) const {
   const double gate = gate_of(s);
+  const double pose_variance = std::max(0.0, s.jacobian.dot(pose_covariance_ * s.jacobian));
   const double variance =
       config_.event_sigma_px * config_.event_sigma_px + pose_variance + s.map_sigma_px * s.map_sigma_px;
-  const double share = contour_share(s);
   const double odds = share / std::sqrt(2 * M_PI * variance) * (2 * gate) / (1 - share);
   const int forward = s.speed_px_s > 0 ? 1 : -1;
-  const EdgeDelay delay = edge_delay(s).delay;
   return {static_cast<float>(forward * delay.on_px),
           static_cast<float>(forward * delay.off_px),
           static_cast<float>(gate),
@@ -187,11 +186,10 @@ void EventRegistration::forget_unasked(std::size_t first) {
 /// Of a sample that has got its first event.
 void EventRegistration::make_rule(std::size_t sample) {
   const ContourSample& s = samples_[sample];
-  const Vector6d& J = s.jacobian;
-  sums_.set_rule(sample, rule_of(s, std::max(0.0, J.dot(pose_covariance_ * J))));
   const double share = contour_share(s), clutter = config_.polarity_tells_clutter ? (1 - share) / share : 0;
-  const double delay_sigma_px = edge_delay(s).sigma_px;
-  members_[sample] = {cluster_of(s), s.map_sigma_px * s.map_sigma_px, delay_sigma_px * delay_sigma_px,
+  const FilteredEdgeDelay::Value delay = edge_delay(s);
+  sums_.set_rule(sample, rule_of(s, share, delay.delay));
+  members_[sample] = {cluster_of(s), s.map_sigma_px * s.map_sigma_px, delay.sigma_px * delay.sigma_px,
                       clutter * clutter};
 }
 

@@ -95,7 +95,7 @@ class EventRegistration final : public Registration {
              const Matrix6d& pose_covariance);
   void forget_unasked(std::size_t first);
   void make_rule(std::size_t sample);
-  EventRule rule_of(const ContourSample& sample, double pose_variance) const;
+  EventRule rule_of(const ContourSample& sample, double share, const EdgeDelay& delay) const;
   void shift_sums(const RegistrationProblem& problem);
   void look_again(const RegistrationProblem& problem);
   EventVerdict verdict(const EventRule& rule, float distance, bool on) const;

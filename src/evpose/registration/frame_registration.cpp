@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -63,8 +63,7 @@ void FrameRegistration::rearrange_segments(std::span<const std::uint32_t> before
                                            std::span<const int> map_contrast) {
   std::vector<float> now(before.size());
   for (std::size_t i = 0; i < before.size(); ++i)
-    now[i] = before[i] == ContrastMemory::kNew ? kSignOfMap * static_cast<float>(map_contrast[i])
-                                               : signs_[before[i]];
+    now[i] = before[i] == kNewSegment ? kSignOfMap * static_cast<float>(map_contrast[i]) : signs_[before[i]];
   signs_ = std::move(now);
 }
 

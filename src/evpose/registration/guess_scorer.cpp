@@ -7,8 +7,7 @@ namespace evpose {
 namespace {
 
 constexpr int kDraws = 120;
-constexpr double kNarrowing = 0.98;    // of the steps, from one to the next: to a tenth
-constexpr double kTypicalDepth_m = 3;  // turns pixels into metres
+constexpr double kNarrowing = 0.98;  // of the steps, from one to the next: to a tenth
 
 double uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -26,9 +26,7 @@ double kept(double offset_px, double map_variance_px2) {
 }  // namespace
 
 void LastingOffsets::rearrange(std::span<const std::uint32_t> before) {
-  const std::vector<Segment> old = std::exchange(segments_, std::vector<Segment>(before.size()));
-  for (std::size_t i = 0; i < before.size(); ++i)
-    if (before[i] != ContrastMemory::kNew) segments_[i] = old[before[i]];
+  segments_ = rearranged(segments_, before);
 }
 
 void LastingOffsets::forget() {

@@ -17,7 +17,7 @@ class LastingOffsets {
  public:
   explicit LastingOffsets(std::uint32_t segments) : segments_(segments) {}
 
-  /// The segments are others now: `before` has the number that each had, or ContrastMemory::kNew.
+  /// The segments are others now; see rearranged().
   void rearrange(std::span<const std::uint32_t> before);
   /// What was seen up to now does not count any more.
   void forget();

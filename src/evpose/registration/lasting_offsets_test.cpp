@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -112,7 +112,7 @@ TEST(LastingOffsets, FollowsSegmentsThatGetOtherNumbers) {
   Scene scene;
   LastingOffsets lasting(kSegments);
   scene.show(lasting, 0.5, one_off);
-  const std::vector<std::uint32_t> before{ContrastMemory::kNew, 3, 2};
+  const std::vector<std::uint32_t> before{kNewSegment, 3, 2};
   const double trust = lasting.trust(3);
   lasting.rearrange(before);
   EXPECT_EQ(lasting.trust(0), 1);

@@ -30,7 +30,6 @@ constexpr double kConverged = 0.05;      // a step below this share of the kerne
 constexpr double kApart_px = 5;          // of those to refine: that far the turns and the refinement reach
 constexpr std::size_t kSeenPoints = 12;  // by which poses are told apart
 constexpr double kDifferent_px = 1;      // poses that see the points nearer to each other are one
-constexpr double kTypicalDepth_m = 3;    // turns metres into pixels where poses are compared
 constexpr double kNearest_m = 0.05;      // points nearer to the camera are not projected
 constexpr double kMargin_px = 2;         // the field is interpolated inside of this
 

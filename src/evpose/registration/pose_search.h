@@ -12,6 +12,9 @@
 
 namespace evpose {
 
+/// Of contours, where metres of position are compared with pixels or angles.
+constexpr double kTypicalDepth_m = 3;
+
 /// A contour point, map frame.
 struct SearchPoint {
   Eigen::Vector3d position, tangent;

@@ -25,7 +25,6 @@ constexpr double kPlaceSigma = 0.15;                         // of a position am
 constexpr double kLastReach_px = 3;
 constexpr double kAbove_rad = 0.35;                   // in the image, 1 sigma
 constexpr double kBeside_m = 0.5, kBesideSigmas = 1;  // of the first prior, places are known, too
-constexpr double kTypicalDepth_m = 3;                 // turns metres into angles
 constexpr double kReach = 0.03;                       // of the first refinement, tangent units
 constexpr std::size_t kComparedPoints = 500;          // at most, in the first refinement
 constexpr double kNearest_m = 0.2;                    // from the camera

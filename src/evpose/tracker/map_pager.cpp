@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "evpose/map/visible_set.h"
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 
@@ -44,7 +44,7 @@ NextMap followed(const PreparedMap& before, PreparedMap next) {
   NextMap out{std::move(next), {}, {}, {}};
   const ContourMap &old = *before.map, &now = *out.prepared.map;
   out.point_now.assign(old.points.size(), VisibleSet::kGone);
-  out.segment_before.assign(out.prepared.segments.count, ContrastMemory::kNew);
+  out.segment_before.assign(out.prepared.segments.count, kNewSegment);
   for (std::uint32_t a = 0, b = 0; a < old.points.size() && b < now.points.size();) {
     if (old.number(a) == now.number(b)) {
       out.segment_before[out.prepared.segments.of_point[b]] = before.segments.of_point[a];

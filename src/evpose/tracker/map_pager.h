@@ -38,7 +38,7 @@ struct PreparedMap {
 struct NextMap {
   PreparedMap prepared;
   std::vector<std::uint32_t> point_now;       ///< of each point of the part before; VisibleSet::kGone
-  std::vector<std::uint32_t> segment_before;  ///< of each contrast segment; ContrastMemory::kNew
+  std::vector<std::uint32_t> segment_before;  ///< of each contrast segment; kNewSegment
   std::vector<int> contrast;                  ///< that the map states of each segment
 };
 

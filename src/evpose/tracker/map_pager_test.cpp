@@ -7,7 +7,7 @@
 #include <set>
 
 #include "evpose/map/visible_set.h"
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 #include "evpose/tracker/test_flight.h"
 #include "evpose/tracker/tracker.h"
 
@@ -60,7 +60,7 @@ TEST(MapPager, PointsAndSegmentsOfTwoPartsAreJoinedByTheirPlace) {
     EXPECT_EQ(next.segment_before[next.prepared.segments.of_point[j]], before.segments.of_point[i]);
     EXPECT_EQ(next.prepared.offset_segments[j], before.offset_segments[i]);
   }
-  const auto fresh = std::count(next.segment_before.begin(), next.segment_before.end(), ContrastMemory::kNew);
+  const auto fresh = std::count(next.segment_before.begin(), next.segment_before.end(), kNewSegment);
   std::set<std::uint32_t> in_new_points;
   for (std::uint32_t j = end - 100 - begin; j < now.points.size(); ++j)
     in_new_points.insert(next.prepared.segments.of_point[j]);

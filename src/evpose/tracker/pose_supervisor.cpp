@@ -10,19 +10,6 @@ namespace {
 
 constexpr double kPatience_s = 0.5;  // lost, or with a pose that is not consistent with the map: then search
 constexpr double kPatienceWithGiven_s = 1;  // with one that was given, in a map that states errors
-constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
-constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
-constexpr double kContestedShare = 0.5;     // of time in which one direction of contours does not agree
-constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
-constexpr double kContested_s = 0.2;  // of a pose that was verified: one direction may pass without events
-constexpr double kHopeless_s = 1;     // without a search
-// A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
-constexpr double kDoubtPosition_m = 3, kDoubtRotation_rad = 0.35;
-// Of one that was found among many: as far off as others explain the events nearly as well.
-constexpr double kFoundPosition_m = 0.03, kFoundRotation_rad = 0.01;
-constexpr double kFoundFades_s = 0.5;  // while events confirm it, in a map that states none
-// A pose that was right slides along the contours that are left.
-constexpr double kSlides_m_s = 0.3, kSlides_rad_s = 0.1;
 constexpr const char* kContradiction =
     "not in this map, or far from the pose: contours lie where no events are";
 constexpr const char* kImprobable = "pose in doubt: contours and events agree no better than at wrong poses";
@@ -72,33 +59,15 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   set_sigma(error_state::kV, Relocalizer::kFoundVelocitySigma_m_s);
   verify_until_ = input.t + from_seconds(Relocalizer::kVerify_s);
   verifier_.restart();
-  verified_ = believed_ = false;
+  believed_ = false;
   probability_.found();
-  found_doubt_ = map_may_be_wrong_ ? 0 : 1;
-  confirmed_s_ = contradicted_s_ = 0;
+  verdicts_.found();
   return state;
 }
 
 void PoseSupervisor::take_verdict(double span_s, bool accepted) {
   const PoseVerdict verdict = verifying() ? verifier_.verdict_of_found() : verifier_.verdict();
-  // Without events there is no new evidence: a scene at rest does not confirm a pose that was found.
-  const double confirming_s = accepted || !verifying() ? span_s : 0;
-  if (verdict == PoseVerdict::confirmed) {
-    confirmed_s_ += confirming_s;
-    found_doubt_ *= std::exp(-span_s / kFoundFades_s);
-  }
-  // In texture one direction may go without clearly more events for a while, of right poses and of wrong
-  // ones.
-  const bool waits = verdict == PoseVerdict::contested && verifying() && !map_may_be_wrong_;
-  if (waits && probability_.is_believed()) confirmed_s_ += kContestedShare * confirming_s;
-  if (verdict != PoseVerdict::confirmed && !waits) confirmed_s_ = 0;
-  contested_s_ = verdict == PoseVerdict::contested ? contested_s_ + span_s : 0;
-  // Some of the contours that are built of a cloud are where nothing is.
-  const bool given_agrees =
-      map_may_be_wrong_ && !verified_ && !verifying() && verdict == PoseVerdict::contested;
-  if (verdict == PoseVerdict::confirmed || given_agrees) contradicted_s_ = 0;
-  if (verdict == PoseVerdict::refuted) contradicted_s_ += span_s;
-  verified_ |= confirmed_s_ > (verifying() ? kFoundConfirmed_s : kConfirmed_s);
+  verdicts_.add({verdict, span_s, verifying(), accepted, probability_.is_believed()});
 }
 
 void PoseSupervisor::weigh(const UpdateEvidence& e) {
@@ -107,47 +76,26 @@ void PoseSupervisor::weigh(const UpdateEvidence& e) {
     probability_.confirm();
   else if (e.refused.empty())
     probability_.add(look(), e.registration.gate_concentration, e.span_s);
-  believed_ |= verified_ && probability_.is_believed();
-}
-
-bool PoseSupervisor::is_contradicted() const { return contradicted_s_ > kContradicted_s; }
-
-/// Contours of each direction have had events at some time once it is verified.
-bool PoseSupervisor::is_contested() const {
-  return contested_s_ > (verified_ ? kContested_s : kContradicted_s);
+  believed_ |= verdicts_.verified() && probability_.is_believed();
 }
 
 bool PoseSupervisor::is_hopeless() const {
-  return searching() ? relocalizer_.has_tried_all() : !config_.on && contradicted_s_ > kHopeless_s;
-}
-
-Matrix6d PoseSupervisor::doubt() const {
-  double position_m = 0, rotation_rad = 0;
-  if (is_contradicted() || (!verified_ && (is_contested() || verifying())))
-    position_m = kDoubtPosition_m, rotation_rad = kDoubtRotation_rad;
-  else if (is_contested())
-    position_m = kSlides_m_s * contested_s_, rotation_rad = kSlides_rad_s * contested_s_;
-  position_m = std::hypot(position_m, found_doubt_ * kFoundPosition_m);
-  rotation_rad = std::hypot(rotation_rad, found_doubt_ * kFoundRotation_rad);
-  Matrix6d out = Matrix6d::Zero();
-  out.diagonal().head<3>().setConstant(position_m * position_m);
-  out.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad);
-  return out;
+  return searching() ? relocalizer_.has_tried_all() : !config_.on && verdicts_.is_hopeless();
 }
 
 Matrix6d PoseSupervisor::told_covariance(const FusionState& reported, const UpdateEvidence& e) {
   const Matrix6d stated = reported.pose_covariance();
-  if (searching()) held_.restart(kFoundPosition_m, kFoundRotation_rad);
-  if (!map_may_be_wrong_ || !initialised()) return stated + doubt();
-  return doubt() +
-         held_.update(stated, reported.nav.T_map_body.q, e.registration.gate_concentration, e.span_s);
+  const Matrix6d doubt = verdicts_.doubt(verifying());
+  if (searching()) held_.restart(VerdictHistory::kFoundPosition_m, VerdictHistory::kFoundRotation_rad);
+  if (!map_may_be_wrong_ || !initialised()) return stated + doubt;
+  return doubt + held_.update(stated, reported.nav.T_map_body.q, e.registration.gate_concentration, e.span_s);
 }
 
 /// A pose that was found is believed once its events have concentrated at the contours for a while, and are
 /// clearly more there than beside them.
 bool PoseSupervisor::found_pose_is_refuted(TimeNs t, const RegistrationResult& r) const {
   return verification_is_over(t) &&
-         (r.gate_concentration < Relocalizer::kLowConcentration || is_contradicted());
+         (r.gate_concentration < Relocalizer::kLowConcentration || verdicts_.is_contradicted());
 }
 
 bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) const {
@@ -158,8 +106,9 @@ bool PoseSupervisor::pose_is_unconfirmed(TimeNs t, const RegistrationResult& r) 
 /// then leave it for one that only looks better: one that was given is left where events do not gather at it,
 /// one that was verified not even then, since a change of the light hides where they gather.
 bool PoseSupervisor::is_astray(const RegistrationResult& r, Health health) const {
-  const bool refuted =
-      map_may_be_wrong_ ? !r.consistent && !verified_ : is_contradicted() || (!r.consistent && !verified_);
+  const bool refuted = map_may_be_wrong_
+                           ? !r.consistent && !verdicts_.verified()
+                           : verdicts_.is_contradicted() || (!r.consistent && !verdicts_.verified());
   return refuted || (health == Health::lost && !verifying());
 }
 
@@ -188,7 +137,7 @@ void PoseSupervisor::resume_search(TimeNs t, BackEnd& fusion) {
   fusion.start(state);
   relocalizer_.restart_search(t);
   verifier_.restart();
-  contradicted_s_ = std::max(contradicted_s_, 2 * kContradicted_s);
+  verdicts_.contradict();
 }
 
 void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6d& covariance) {
@@ -207,7 +156,7 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   // told, not to how far a contour may lie from where it is looked for.
   const PoseUncertainty uncertainty(state, e.view);
   take_verdict(e.span_s, e.refused.empty());
-  verified_ |= e.frames_confirm && !searching();
+  if (e.frames_confirm && !searching()) verdicts_.verify();
   weigh(e);
   const bool refuted = found_pose_is_refuted(e.t, e.registration);
   Evidence evidence;
@@ -225,13 +174,14 @@ Health PoseSupervisor::judge(const UpdateEvidence& e, BackEnd& fusion, std::stri
   evidence.verified = believed_;
   evidence.hopeless = is_hopeless();
   if (believed_ && !probability_.is_believed()) evidence.contradicted = kImprobable;
-  if (is_contested()) evidence.contradicted = kOneDirection;
-  if (is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
+  if (verdicts_.is_contested()) evidence.contradicted = kOneDirection;
+  if (verdicts_.is_contradicted() || evidence.hopeless) evidence.contradicted = kContradiction;
   const Health health = health_.judge(evidence, reason);
   astray_s_ = !e.frames_confirm && is_astray(e.registration, health) ? astray_s_ + e.span_s : 0;
-  doubted_s_ =
-      !e.frames_confirm && map_may_be_wrong_ && !verified_ && is_contradicted() ? doubted_s_ + e.span_s : 0;
-  if (verification_is_over(e.t) && (verified_ || refuted)) verify_until_ = 0;
+  doubted_s_ = !e.frames_confirm && map_may_be_wrong_ && !verdicts_.verified() && verdicts_.is_contradicted()
+                   ? doubted_s_ + e.span_s
+                   : 0;
+  if (verification_is_over(e.t) && (verdicts_.verified() || refuted)) verify_until_ = 0;
   if (refuted) resume_search(e.t, fusion);
   if (config_.on && !searching() && is_astray_for_long()) begin_search(e.t, fusion, state.pose_covariance());
   return health;

@@ -13,6 +13,7 @@
 #include "evpose/tracker/pose_uncertainty.h"
 #include "evpose/tracker/pose_verifier.h"
 #include "evpose/tracker/relocalizer.h"
+#include "evpose/tracker/verdict_history.h"
 
 namespace evpose {
 
@@ -39,6 +40,7 @@ class PoseSupervisor {
         health_config_(health),
         relocalizer_(std::move(relocalizer)),
         verifier_(std::move(verifier)),
+        verdicts_(map_may_be_wrong),
         health_(health) {}
 
   /// Begins with the fusion's first state; searches for the pose if that is too unsure.
@@ -49,7 +51,8 @@ class PoseSupervisor {
   /// The pose has to be searched, and is not: the start is too unsure, or the pose has been lost or refuted
   /// for long.
   bool needs_search() const {
-    return !config_.on && !searching() && ((start_is_unsure_ && !verified_) || should_be_searched_beside());
+    return !config_.on && !searching() &&
+           ((start_is_unsure_ && !verdicts_.verified()) || should_be_searched_beside());
   }
   /// From now on a pose that gets lost is left to needs_search().
   void search_no_more() { config_.on = false; }
@@ -94,15 +97,12 @@ class PoseSupervisor {
   Matrix6d told_covariance(const FusionState& reported, const UpdateEvidence& evidence);
 
  private:
-  Matrix6d doubt() const;
   bool verifying() const { return verify_until_ != 0; }
   bool verification_is_over(TimeNs t) const { return verifying() && t >= verify_until_; }
   bool found_pose_is_refuted(TimeNs t, const RegistrationResult& registration) const;
   bool pose_is_unconfirmed(TimeNs t, const RegistrationResult& registration) const;
   void take_verdict(double span_s, bool accepted);
   void weigh(const UpdateEvidence& e);
-  bool is_contradicted() const;
-  bool is_contested() const;
   bool is_hopeless() const;
   bool is_astray(const RegistrationResult& registration, Health health) const;
   bool is_astray_for_long() const;
@@ -115,20 +115,16 @@ class PoseSupervisor {
   HealthConfig health_config_;
   Relocalizer relocalizer_;
   PoseVerifier verifier_;
+  VerdictHistory verdicts_;
   PoseProbability probability_;
   HealthMonitor health_;
   HeldCovariance held_;
   FusionState before_search_;
-  TimeNs verify_until_ = 0;    ///< a pose that was found is watched until then; 0: none
-  double astray_s_ = 0;        ///< for how long the pose has been lost or not consistent with the map
-  double doubted_s_ = 0;       ///< for how long in a row one that was given has been contradicted
-  double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
-  double contested_s_ = 0;     ///< for how long in a row one direction's contours have had none
-  double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it
-  double found_doubt_ = 0;     ///< of a pose that was found, from 1 on; 0: it was given
+  TimeNs verify_until_ = 0;  ///< a pose that was found is watched until then; 0: none
+  double astray_s_ = 0;      ///< for how long the pose has been lost or not consistent with the map
+  double doubted_s_ = 0;     ///< for how long in a row one that was given has been contradicted
   bool start_is_unsure_ = false;
-  bool verified_ = false;  ///< the events have confirmed the pose since it was given or found
-  bool believed_ = false;  ///< so it was, and probable enough, at some time since then
+  bool believed_ = false;  ///< verified and probable enough, at some time since it was given or found
 };
 
 }  // namespace evpose

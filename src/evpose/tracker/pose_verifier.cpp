@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "evpose/registration/contrast_memory.h"
+#include "evpose/registration/rearranged.h"
 
 namespace evpose {
 namespace {
@@ -66,16 +66,12 @@ void PoseVerifier::restart() {
 
 void PoseVerifier::rearrange(std::span<const std::uint32_t> before, std::vector<bool> told) {
   told_ = std::move(told);
-  std::vector<std::uint32_t> now(pieces_.size(), ContrastMemory::kNew);
-  std::vector<Piece> pieces(before.size());
-  for (std::uint32_t i = 0; i < before.size(); ++i) {
-    if (before[i] == ContrastMemory::kNew) continue;
-    pieces[i] = pieces_[before[i]];
-    now[before[i]] = i;
-  }
-  pieces_ = std::move(pieces);
+  std::vector<std::uint32_t> now(pieces_.size(), kNewSegment);
+  for (std::uint32_t i = 0; i < before.size(); ++i)
+    if (before[i] != kNewSegment) now[before[i]] = i;
+  pieces_ = rearranged(pieces_, before);
   for (std::uint32_t& piece : seen_) piece = now[piece];
-  std::erase(seen_, ContrastMemory::kNew);
+  std::erase(seen_, kNewSegment);
   judge();
 }
 

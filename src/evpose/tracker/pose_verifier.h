@@ -38,8 +38,7 @@ class PoseVerifier {
 
   /// The pose comes from elsewhere: what was seen does not count any more.
   void restart();
-  /// The pieces are those of another part of the map from now on: number i was `before[i]`, or is new
-  /// (ContrastMemory::kNew).
+  /// The pieces are those of another part of the map from now on; see rearranged().
   void rearrange(std::span<const std::uint32_t> before, std::vector<bool> told);
   /// One update of several: all events of its span, and the contours at its time; `elapsed_s`: since the
   /// last one that was looked at. `thinning`: where there are all events, out to kAside_px beside contours.

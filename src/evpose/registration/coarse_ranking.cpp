@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 namespace evpose {
 namespace {
@@ -15,7 +16,26 @@ constexpr double kMargin_px = 2;
 constexpr int kDirections = EdgeField::kDirections;
 constexpr float kStep = 0.04F;                        // of a point's score
 constexpr int kMostSteps = 93;                        // 3.7, more than an edge in empty surroundings tells
-constexpr std::size_t kAddable = 65535 / kMostSteps;  // points, in 16 bits
+constexpr std::size_t kAddable = 65535 / kMostSteps;  // points, in 16 bits; two of them in eight
+
+constexpr std::size_t kSide = 8;  // points projected side by side
+using Floats = float __attribute__((vector_size(4 * kSide)));
+using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
+using Bytes = std::uint8_t __attribute__((vector_size(16)));
+using Words = std::uint16_t __attribute__((vector_size(32)));
+
+template <class Vector, class Element>
+Vector load(const Element* from) {
+  Vector out;
+  std::memcpy(&out, from, sizeof out);
+  return out;
+}
+Floats all(float v) { return v - Floats{}; }
+Floats magnitude(Floats v) { return v < 0 ? -v : v; }
+Floats limited(Floats v, float from, float to) {
+  v = v < from ? all(from) : v;
+  return to < v ? all(to) : v;
+}
 
 /// A direction by its number: evenly along the sides of a square, which needs no arc tangent.
 Eigen::Vector2d direction_of(int number) {
@@ -72,64 +92,83 @@ std::uint8_t CoarseScores::steps(float score) const {
 
 void CoarseScores::set_points(std::span<const SearchPoint> points, const Eigen::Vector3d& origin) {
   count_ = points.size();
-  points_.resize(6 * count_);
-  entries_.resize(count_);
+  padded_ = (count_ + kSide - 1) / kSide * kSide;
+  points_.assign(6 * padded_, 0.0F);
+  entries_.resize(padded_);
   for (std::size_t i = 0; i < count_; ++i) {
     const SearchPoint& point = points[i];
     for (std::size_t k = 0; k < 3; ++k) {
-      points_[k * count_ + i] =
+      points_[k * padded_ + i] =
           static_cast<float>(point.position[static_cast<int>(k)] - origin[static_cast<int>(k)]);
-      points_[(3 + k) * count_ + i] = static_cast<float>(point.tangent[static_cast<int>(k)]);
+      points_[(3 + k) * padded_ + i] = static_cast<float>(point.tangent[static_cast<int>(k)]);
     }
   }
 }
 
-void CoarseScores::find_entries(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const {
-  const float *px = points_.data(), *py = px + count_, *pz = py + count_, *tx = pz + count_,
-              *ty = tx + count_, *tz = ty + count_;
+std::span<const std::int32_t> CoarseScores::find_entries(const Eigen::Matrix3f& R,
+                                                         const Eigen::Vector3f& t) const {
+  const float *px = points_.data(), *py = px + padded_, *pz = py + padded_, *tx = pz + padded_,
+              *ty = tx + padded_, *tz = ty + padded_;
   const int plane = columns_ * rows_, width = columns_;
   constexpr int kReach = kTurns / 2;
   constexpr auto kRim = static_cast<float>(kReach);
   const float last_column = static_cast<float>(columns_) - kRim, last_row = static_cast<float>(rows_) - kRim;
-  std::int32_t* entries = entries_.data();
-  for (std::size_t i = 0; i < count_; ++i) {
-    const float x = R(0, 0) * px[i] + R(0, 1) * py[i] + R(0, 2) * pz[i] + t.x();
-    const float y = R(1, 0) * px[i] + R(1, 1) * py[i] + R(1, 2) * pz[i] + t.y();
-    const float z = R(2, 0) * px[i] + R(2, 1) * py[i] + R(2, 2) * pz[i] + t.z();
-    const float scale = 1 / std::max(z, kNearest_m), u = x * scale, v = y * scale;
-    const float dz = R(2, 0) * tx[i] + R(2, 1) * ty[i] + R(2, 2) * tz[i];
-    const float du = R(0, 0) * tx[i] + R(0, 1) * ty[i] + R(0, 2) * tz[i] - u * dz;
-    const float dv = R(1, 0) * tx[i] + R(1, 1) * ty[i] + R(1, 2) * tz[i] - v * dz;
-    const float a = std::abs(du), b = std::abs(dv);
-    const float turn = (du * dv >= 0 ? b : 2 * a + b) / std::max(a + b, 1e-12F);  // 0 .. 2, as direction_of()
-    const int direction = static_cast<int>(0.5F * (kDirections * turn + 1)) & (kDirections - 1);
-    const float column = std::min(std::max(u * cells_per_unit_ + half_width_, 0.0F), last_column),
-                row = std::min(std::max(v * cells_per_unit_ + half_height_, 0.0F), last_row);
-    const bool inside =
-        z > kNearest_m && column >= kRim && row >= kRim && column < last_column && row < last_row;
-    const int at = direction * plane + static_cast<int>(row) * width + static_cast<int>(column);
-    entries[i] = inside ? at : -1;
+  std::size_t inside = 0;
+  for (std::size_t i = 0; i < count_; i += kSide) {
+    const auto X = load<Floats>(px + i), Y = load<Floats>(py + i), Z = load<Floats>(pz + i);
+    const Floats x = R(0, 0) * X + R(0, 1) * Y + R(0, 2) * Z + t.x();
+    const Floats y = R(1, 0) * X + R(1, 1) * Y + R(1, 2) * Z + t.y();
+    const Floats z = R(2, 0) * X + R(2, 1) * Y + R(2, 2) * Z + t.z();
+    const Floats scale = 1 / (z < kNearest_m ? all(kNearest_m) : z), u = x * scale, v = y * scale;
+    const auto TX = load<Floats>(tx + i), TY = load<Floats>(ty + i), TZ = load<Floats>(tz + i);
+    const Floats dz = R(2, 0) * TX + R(2, 1) * TY + R(2, 2) * TZ;
+    const Floats du = R(0, 0) * TX + R(0, 1) * TY + R(0, 2) * TZ - u * dz;
+    const Floats dv = R(1, 0) * TX + R(1, 1) * TY + R(1, 2) * TZ - v * dz;
+    const Floats a = magnitude(du), b = magnitude(dv), sum = a + b;
+    const Floats turn = (du * dv >= 0 ? b : 2 * a + b) / (sum < 1e-12F ? all(1e-12F) : sum);  // 0 .. 2
+    const Ints direction = __builtin_convertvector(0.5F * (kDirections * turn + 1), Ints) & (kDirections - 1);
+    const Floats column = limited(u * cells_per_unit_ + half_width_, 0, last_column),
+                 row = limited(v * cells_per_unit_ + half_height_, 0, last_row);
+    const Ints seen =
+        (z > kNearest_m) & (column >= kRim) & (row >= kRim) & (column < last_column) & (row < last_row);
+    const Ints at = direction * plane + __builtin_convertvector(row, Ints) * width +
+                    __builtin_convertvector(column, Ints);
+    for (std::size_t k = 0; k < std::min(kSide, count_ - i); ++k) {
+      entries_[inside] = at[k];
+      inside -= static_cast<std::size_t>(seen[k]);
+    }
+  }
+  return {entries_.data(), inside};
+}
+
+void CoarseScores::add_turns(std::span<const std::int32_t> entries, std::uint32_t* sums) const {
+  constexpr int kRows = kTurns / 2;  // as many sums as there are registers
+  const std::uint8_t* begin = scores_.data() - kTurns / 2 * (columns_ + 1);
+  for (int half = 0; half < kTurns; half += kRows, begin += kRows * columns_) {
+    std::array<Words, kRows> total{};
+    const std::size_t even = entries.size() / 2 * 2;
+    for (std::size_t i = 0; i < even; i += 2) {
+      const std::uint8_t *one = begin + entries[i], *other = begin + entries[i + 1];
+      for (int row = 0; row < kRows; ++row) {
+        const Bytes two = load<Bytes>(one + row * columns_) + load<Bytes>(other + row * columns_);
+        total[static_cast<std::size_t>(row)] += __builtin_convertvector(two, Words);
+      }
+    }
+    for (int row = 0; row < kRows; ++row) {
+      Words& words = total[static_cast<std::size_t>(row)];
+      if (even < entries.size())
+        words += __builtin_convertvector(load<Bytes>(begin + entries[even] + row * columns_), Words);
+      for (int column = 0; column < kTurns; ++column) sums[(half + row) * kTurns + column] += words[column];
+    }
   }
 }
 
 CoarseScores::Turned CoarseScores::best_turn(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const {
-  find_entries(R, t);
-  constexpr auto kAll = static_cast<std::size_t>(kTurns * kTurns);
-  std::array<std::uint32_t, kAll> sums{};
-  std::size_t inside = 0;
-  for (std::size_t begin = 0; begin < entries_.size(); begin += kAddable) {
-    std::array<std::uint16_t, kAll> part{};
-    for (std::size_t i = begin; i < std::min(begin + kAddable, entries_.size()); ++i) {
-      if (entries_[i] < 0) continue;
-      ++inside;
-      const std::uint8_t* from = scores_.data() + entries_[i] - kTurns / 2 * (columns_ + 1);
-      std::uint16_t* sum = part.data();
-      for (int row = 0; row < kTurns; ++row, from += columns_, sum += kTurns)
-        for (int column = 0; column < kTurns; ++column)
-          sum[column] = static_cast<std::uint16_t>(sum[column] + from[column]);
-    }
-    for (std::size_t k = 0; k < kAll; ++k) sums[k] += part[k];
-  }
+  const std::span<const std::int32_t> entries = find_entries(R, t);
+  const std::size_t inside = entries.size();
+  std::array<std::uint32_t, static_cast<std::size_t>(kTurns * kTurns)> sums{};
+  for (std::size_t begin = 0; begin < inside; begin += kAddable)
+    add_turns(entries.subspan(begin, std::min(kAddable, inside - begin)), sums.data());
   const auto best = static_cast<int>(std::ranges::max_element(sums) - sums.begin());
   const int column = best % kTurns - kTurns / 2, row = best / kTurns - kTurns / 2;
   const double x = column / static_cast<double>(cells_per_unit_),

@@ -39,7 +39,10 @@ class CoarseScores {
                static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);
   }
-  void find_entries(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const;
+  /// Where the points are seen, of those in the table.
+  std::span<const std::int32_t> find_entries(const Eigen::Matrix3f& R, const Eigen::Vector3f& t) const;
+  /// Of each turn, what these points add.
+  void add_turns(std::span<const std::int32_t> entries, std::uint32_t* sums) const;
   void fill_cell(const EdgeField& field, const Camera& camera, int column, int row, float seen_share);
   std::uint8_t steps(float score) const;
 
@@ -50,8 +53,8 @@ class CoarseScores {
   float lowest_;                      ///< score of a step of zero
   std::vector<std::uint8_t> scores_;  ///< steps; one table for each direction, with a rim of kTurns / 2 cells
   std::vector<float> points_;         ///< six arrays: position and tangent
-  std::size_t count_ = 0;
-  mutable std::vector<std::int32_t> entries_;  ///< where each point is seen; below zero: not in the table
+  std::size_t count_ = 0, padded_ = 0;  ///< length of the points, and of the arrays
+  mutable std::vector<std::int32_t> entries_;
 };
 
 }  // namespace evpose

@@ -136,6 +136,24 @@ TEST_F(PoseSearchLaws, TheTableOfScoresSaysWhatTheFieldDoesOfTheBestTurn) {
     }
 }
 
+/// Points are projected eight at a time, added two at a time, and some hundreds in 16 bits.
+TEST_F(PoseSearchLaws, TheTableSaysTheSameOfPointsThatAreGivenManyTimes) {
+  CoarseScores table(field_, *camera_, 0.3F, -0.3F);
+  for (const std::size_t count : {1UL, 2UL, 7UL, 9UL, 50UL}) {
+    const std::vector<SearchPoint> few(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(count));
+    table.set_points(few, Eigen::Vector3d::Zero());
+    const auto once = table.best_turn(Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero());
+    std::vector<SearchPoint> many;
+    for (const std::size_t wanted : {3 * count, 1000UL, 1501UL}) {
+      while (many.size() < wanted) many.insert(many.end(), few.begin(), few.end());
+      table.set_points(many, Eigen::Vector3d::Zero());
+      const auto again = table.best_turn(Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero());
+      EXPECT_EQ(again.turn, once.turn) << count << ' ' << wanted;
+      EXPECT_NEAR(again.score, once.score, 1e-6) << count << ' ' << wanted;
+    }
+  }
+}
+
 TEST_F(PoseSearchLaws, ATurnWithinReachIsTurnedBack) {
   CoarseScores table(field_, *camera_, 0.3F, -0.3F);
   table.set_points(points_, Eigen::Vector3d::Zero());

@@ -61,7 +61,7 @@ std::optional<FusionState> PoseSupervisor::search(const RelocalizerInput& input,
   verifier_.restart();
   believed_ = false;
   probability_.found();
-  verdicts_.found();
+  verdicts_.found(start_was_wrong_);
   return state;
 }
 
@@ -77,6 +77,7 @@ void PoseSupervisor::weigh(const UpdateEvidence& e) {
   else if (e.refused.empty())
     probability_.add(look(), e.registration.gate_concentration, e.span_s);
   believed_ |= verdicts_.verified() && probability_.is_believed();
+  ever_believed_ |= believed_;
 }
 
 bool PoseSupervisor::is_hopeless() const {
@@ -144,6 +145,7 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
   Matrix6d around = covariance;
   around.diagonal().head<3>().array() += std::pow(config_.position_sigma_m, 2);
   around.diagonal().tail<3>().array() += std::pow(config_.rotation_sigma_rad, 2);
+  start_was_wrong_ = !ever_believed_;
   before_search_ = fusion.state();
   relocalizer_.begin_search(t, fusion.state().nav, around);
   verifier_.restart();

@@ -124,7 +124,9 @@ class PoseSupervisor {
   double astray_s_ = 0;      ///< for how long the pose has been lost or not consistent with the map
   double doubted_s_ = 0;     ///< for how long in a row one that was given has been contradicted
   bool start_is_unsure_ = false;
-  bool believed_ = false;  ///< verified and probable enough, at some time since it was given or found
+  bool start_was_wrong_ = false;  ///< the pose is sought, or was found, near one that was given and refuted
+  bool ever_believed_ = false;    ///< since the start
+  bool believed_ = false;         ///< verified and probable enough, at some time since it was given or found
 };
 
 }  // namespace evpose

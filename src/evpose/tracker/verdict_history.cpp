@@ -8,9 +8,10 @@ namespace evpose {
 namespace {
 
 constexpr double kConfirmed_s = 0.04;  // four looks: a few pieces of contours agree by chance for a moment
-constexpr double kFoundConfirmed_s = 0.15;  // of a pose that was chosen among many because it agrees
-constexpr double kContestedShare = 0.5;     // of time in which one direction of contours does not agree
-constexpr double kContradicted_s = 0.05;    // by chance, few contours have events for so long
+constexpr double kFoundConfirmed_s = 0.15;   // of a pose that was chosen among many because it agrees
+constexpr double kSuspectConfirmed_s = 0.5;  // near a start that was wrong: in texture looks agree for long
+constexpr double kContestedShare = 0.5;      // of time in which one direction of contours does not agree
+constexpr double kContradicted_s = 0.05;     // by chance, few contours have events for so long
 constexpr double kContested_s = 0.2;  // of a pose that was verified: one direction may pass without events
 constexpr double kHopeless_s = 1;     // without a search
 // A pose that the events contradict is wrong by no one knows what: as if only GPS and a compass told it.
@@ -39,11 +40,20 @@ void VerdictHistory::add(const Look& look) {
   const bool given_agrees = contested && map_may_be_wrong_ && !verified_ && !look.watched;
   if (look.verdict == PoseVerdict::confirmed || given_agrees) contradicted_s_ = 0;
   if (look.verdict == PoseVerdict::refuted) contradicted_s_ += look.span_s;
-  verified_ |= confirmed_s_ > (look.watched ? kFoundConfirmed_s : kConfirmed_s);
+  // In a map of a cloud right poses are refuted at first, too.
+  start_was_wrong_ |= !look.watched && !verified_ && !map_may_be_wrong_ && is_contradicted();
+  verified_ |= confirmed_s_ > needed_s(look.watched);
 }
 
-void VerdictHistory::found() {
+/// For how long in a row events have to confirm the pose.
+double VerdictHistory::needed_s(bool watched) const {
+  if (start_was_wrong_) return kSuspectConfirmed_s;
+  return watched ? kFoundConfirmed_s : kConfirmed_s;
+}
+
+void VerdictHistory::found(bool start_was_wrong) {
   *this = VerdictHistory(map_may_be_wrong_);
+  start_was_wrong_ = start_was_wrong;
   found_doubt_ = map_may_be_wrong_ ? 0 : 1;
 }
 

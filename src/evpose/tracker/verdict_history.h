@@ -21,8 +21,9 @@ class VerdictHistory {
     bool probable = false;  ///< it is the right one; see PoseProbability
   };
   void add(const Look& look);
-  /// The pose is another one from now on, chosen among many.
-  void found();
+  /// The pose is another one from now on, chosen among many; `start_was_wrong`: near one that was given and
+  /// refuted, so that the right one may not have been among them.
+  void found(bool start_was_wrong);
   /// The pose is right, by other means than events.
   void verify() { verified_ = true; }
   /// The pose is wrong, and is being searched.
@@ -42,12 +43,15 @@ class VerdictHistory {
   static constexpr double kFoundPosition_m = 0.03, kFoundRotation_rad = 0.01;
 
  private:
+  double needed_s(bool watched) const;
+
   bool map_may_be_wrong_;
   bool verified_ = false;
-  double contradicted_s_ = 0;  ///< for how long the events have contradicted the pose
-  double contested_s_ = 0;     ///< for how long in a row one direction's contours have had none
-  double confirmed_s_ = 0;     ///< for how long in a row they have confirmed it
-  double found_doubt_ = 0;     ///< of a pose that was found, from 1 on; 0: it was given
+  bool start_was_wrong_ = false;  ///< refuted before it was verified: this pose, or that which it was near
+  double contradicted_s_ = 0;     ///< for how long the events have contradicted the pose
+  double contested_s_ = 0;        ///< for how long in a row one direction's contours have had none
+  double confirmed_s_ = 0;        ///< for how long in a row they have confirmed it
+  double found_doubt_ = 0;        ///< of a pose that was found, from 1 on; 0: it was given
 };
 
 }  // namespace evpose

@@ -29,7 +29,7 @@ double until_verified_s(VerdictHistory& history, const Look& each) {
 
 VerdictHistory of_found(bool map_may_be_wrong) {
   VerdictHistory out(map_may_be_wrong);
-  out.found();
+  out.found(false);
   return out;
 }
 
@@ -44,6 +44,27 @@ TEST(VerdictHistoryLaws, APoseThatWasFoundNeedsLongerThanOneThatWasGiven) {
   EXPECT_LT(given_s, kSoon_s);
   EXPECT_GT(found_s, 2 * given_s);
   EXPECT_LT(found_s, kLater_s);
+}
+
+TEST(VerdictHistoryLaws, NearAStartThatWasWrongAPoseNeedsLonger) {
+  VerdictHistory found(false);
+  found.found(true);
+  EXPECT_GT(until_verified_s(found, look_at_found(PoseVerdict::confirmed)), 2 * kLater_s);
+  for (const bool built : {false, true}) {
+    VerdictHistory given(built);
+    watch(given, look(PoseVerdict::refuted), 0.1);
+    const double given_s = until_verified_s(given, look(PoseVerdict::confirmed));
+    built ? EXPECT_LT(given_s, kSoon_s) : EXPECT_GT(given_s, 2 * kLater_s);
+    EXPECT_TRUE(given.verified());
+  }
+}
+
+TEST(VerdictHistoryLaws, APoseThatWasVerifiedOnceIsNoStartThatWasWrong) {
+  VerdictHistory history(false);
+  until_verified_s(history, look(PoseVerdict::confirmed));
+  watch(history, look(PoseVerdict::refuted), 0.1);
+  history.found(false);
+  EXPECT_LT(until_verified_s(history, look_at_found(PoseVerdict::confirmed)), kLater_s);
 }
 
 TEST(VerdictHistoryLaws, WhatIsNotSeenVerifiesNothing) {
@@ -93,7 +114,7 @@ TEST(VerdictHistoryLaws, WhatContradictsCountsUntilThePoseIsConfirmedAgain) {
   EXPECT_FALSE(history.is_contradicted());
   watch(history, look(PoseVerdict::refuted), 1.1);
   EXPECT_TRUE(history.is_hopeless());
-  history.found();
+  history.found(false);
   EXPECT_FALSE(history.is_contradicted());
 }
 

@@ -34,6 +34,8 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LES
 endif()
 target_compile_options(evpose_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wno-float-conversion -Wnon-virtual-dtor)
+# Functions of one file pass vectors of eight numbers, which no other compiler has to agree about.
+target_compile_options(evpose_options INTERFACE -Wno-psabi)
 # No multiplication is joined with an addition: what is inlined where, and how strongly it is optimised, then makes no
 # difference to a result, and every build gives the same trajectories to the last bit.
 target_compile_options(evpose_options INTERFACE -ffp-contract=off)

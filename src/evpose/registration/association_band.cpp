@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "evpose/core/float_lanes.h"
+
 namespace evpose {
 namespace {
 
@@ -17,9 +19,9 @@ bool same_line(const AssociationBand& a, const AssociationBand& b) {
          std::abs(a.nx * (b.x - a.x) + a.ny * (b.y - a.y)) < kSameLine_px;
 }
 
-constexpr std::size_t kSide = 8;  // events searched side by side
-using Floats = float __attribute__((vector_size(4 * kSide)));
-using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
+using lanes::Floats;
+using lanes::Ints;
+using lanes::kSide;
 constexpr Floats kRamp{0, 1, 2, 3, 4, 5, 6, 7};
 
 float inverse(float v) { return std::abs(v) > 1 / kFarther ? 1 / v : kFarther; }

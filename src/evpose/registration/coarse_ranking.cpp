@@ -4,10 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+
+#include "evpose/core/float_lanes.h"
 
 namespace evpose {
 namespace {
+
+using lanes::all;
+using lanes::Floats;
+using lanes::Ints;
+using lanes::kSide;
+using lanes::load;
 
 constexpr double kCell_px = 2;       // of the table, and the step of turns; the fine spread is 1.5 px
 constexpr double kWidestTan = 2.5;   // of an image that is wider, the rim is left out
@@ -18,19 +25,9 @@ constexpr float kStep = 0.04F;                        // of a point's score
 constexpr int kMostSteps = 93;                        // 3.7, more than an edge in empty surroundings tells
 constexpr std::size_t kAddable = 65535 / kMostSteps;  // points, in 16 bits; two of them in eight
 
-constexpr std::size_t kSide = 8;  // points projected side by side
-using Floats = float __attribute__((vector_size(4 * kSide)));
-using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
 using Bytes = std::uint8_t __attribute__((vector_size(16)));
 using Words = std::uint16_t __attribute__((vector_size(32)));
 
-template <class Vector, class Element>
-Vector load(const Element* from) {
-  Vector out;
-  std::memcpy(&out, from, sizeof out);
-  return out;
-}
-Floats all(float v) { return v - Floats{}; }
 Floats magnitude(Floats v) { return v < 0 ? -v : v; }
 Floats limited(Floats v, float from, float to) {
   v = v < from ? all(from) : v;

@@ -4,10 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evpose/core/float_lanes.h"
 #include "evpose/registration/coarse_ranking.h"
 
 namespace evpose {
 namespace {
+
+using lanes::all;
+using lanes::Floats;
+using lanes::Ints;
+using lanes::kSide;
+using lanes::load;
 
 constexpr double kCellsPerSpread = 1.6;  // of the table
 constexpr float kSeenShare = 0.3F;       // of the contours in view, motion makes so many visible
@@ -16,21 +23,6 @@ constexpr float kNearest_m = 0.1F;
 constexpr double kBackground = 0.2;  // to each side of a cell the background is averaged over, tangent units
 constexpr float kLeastBackground = 0.01F;  // bounds the weight of a lone line
 constexpr float kFar_cells = 1e3F;
-
-constexpr std::size_t kSide = 8;  // points side by side
-using Floats = float __attribute__((vector_size(4 * kSide)));
-using Ints = std::int32_t __attribute__((vector_size(4 * kSide)));
-
-Floats load(const float* from) {
-  Floats out;
-  std::copy_n(from, kSide, reinterpret_cast<float*>(&out));
-  return out;
-}
-Ints load(const std::int32_t* from) {
-  Ints out;
-  std::copy_n(from, kSide, reinterpret_cast<std::int32_t*>(&out));
-  return out;
-}
 
 }  // namespace
 
@@ -143,7 +135,6 @@ void LineScores::fill(const Plane& distances, const Camera& camera, int number, 
 }
 
 float LineScores::sum(const SeenPoints& points, const Eigen::Vector3f& offset) const {
-  const auto all = [](float v) { return v - Floats{}; };
   const Floats scale = all(cells_per_unit_), half_width = all(0.5F * static_cast<float>(columns_)),
                half_height = all(0.5F * static_cast<float>(rows_)), nearest = all(kNearest_m);
   const Floats zero{}, one = all(1), last_column = all(static_cast<float>(columns_) - 0.5F),
@@ -151,17 +142,17 @@ float LineScores::sum(const SeenPoints& points, const Eigen::Vector3f& offset) c
   const std::int32_t plane = columns_ * rows_, width = columns_;
   Floats total{};
   for (std::size_t i = 0; i < points.x_.size(); i += kSide) {
-    const Floats z = load(&points.z_[i]) + offset.z();
+    const Floats z = load<Floats>(&points.z_[i]) + offset.z();
     const Floats inverse = one / (z > nearest ? z : nearest);
-    Floats column = (load(&points.x_[i]) + offset.x()) * inverse * scale + half_width,
-           row = (load(&points.y_[i]) + offset.y()) * inverse * scale + half_height;
+    Floats column = (load<Floats>(&points.x_[i]) + offset.x()) * inverse * scale + half_width,
+           row = (load<Floats>(&points.y_[i]) + offset.y()) * inverse * scale + half_height;
     // The table's border is outside of the image.
     column = column > zero ? column : zero;
     column = column < last_column ? column : last_column;
     row = row > zero ? row : zero;
     row = row < last_row ? row : last_row;
     column = z > nearest ? column : zero;
-    const Ints at = load(&points.direction_[i]) * plane + __builtin_convertvector(row, Ints) * width +
+    const Ints at = load<Ints>(&points.direction_[i]) * plane + __builtin_convertvector(row, Ints) * width +
                     __builtin_convertvector(column, Ints);
     Floats score;
     for (std::size_t k = 0; k < kSide; ++k) score[k] = scores_[static_cast<std::size_t>(at[k])];

@@ -49,7 +49,7 @@ class LineScores {
   using Plane = std::vector<float>;
   void draw(const Eigen::Vector2d& from, const Eigen::Vector2d& to, std::vector<Plane>& distances) const;
   void transform(Plane& distances) const;
-  void fill(const Plane& distances, const Camera& camera, int direction, double spread);
+  void fill(const Plane& distances, const Camera& camera, int number, double spread);
 
   Eigen::Vector2d half_view_;
   float cells_per_unit_;

@@ -31,6 +31,8 @@ class AttitudeFinder {
                                        const Eigen::Quaterniond& q_body_cam,
                                        const Eigen::Quaterniond& prior_q_map_body,
                                        const Eigen::Matrix3d& covariance);
+  /// The map's.
+  std::span<const MapDirection> directions() const { return directions_; }
 
  private:
   const Camera& camera_;

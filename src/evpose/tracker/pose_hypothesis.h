@@ -15,6 +15,13 @@ inline constexpr double kEdgePositionSigma_m = 0.02, kEdgeRotationSigma_rad = 5e
 /// Of the vehicle when a search begins: it may fly fast in any direction.
 inline constexpr double kUnknownVelocitySigma_m_s = 2;
 
+/// Where a pose at constant velocity and angular rate (rad/s, body) has come to after so long; before, where
+/// that is negative.
+inline Pose carried_on(const Pose& T_map_body, const Eigen::Vector3d& velocity,
+                       const Eigen::Vector3d& angular_rate, double s) {
+  return {T_map_body.q * so3::exp(s * angular_rate), T_map_body.p + s * velocity};
+}
+
 /// A pose that may be the true one, with its velocity. Each axis of position and velocity has a Kalman filter
 /// of two states, each axis of rotation one of one state; the axes share their variances.
 struct PoseHypothesis {

@@ -147,7 +147,7 @@ void PoseSupervisor::begin_search(TimeNs t, const BackEnd& fusion, const Matrix6
   around.diagonal().tail<3>().array() += std::pow(config_.rotation_sigma_rad, 2);
   start_was_wrong_ = !ever_believed_;
   before_search_ = fusion.state();
-  relocalizer_.begin_search(t, fusion.state().nav, around);
+  relocalizer_.begin_search(t, fusion.state().nav, around, start_was_wrong_);
   verifier_.restart();
   astray_s_ = doubted_s_ = 0;
 }

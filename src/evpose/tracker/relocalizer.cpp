@@ -48,9 +48,8 @@ constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than thi
 
 // Searches that compete, each in events of its own: a pose is believed that several of them have found.
 constexpr int kLastCompeting = 5;  // slices, from the third on
-constexpr std::size_t kNewcomers = 6, kMostTogether = 10;
+constexpr std::size_t kMostTogether = 10;
 constexpr int kFoundBy = 2;
-constexpr double kFoundVelocitySpread_m_s = 0.3;  // wrong poses tell the velocity, too
 
 VisibleSetConfig points_to_search(VisibleSetConfig config) {
   config.stride_px = kPointStride_px;
@@ -90,10 +89,12 @@ Relocalizer::Relocalizer(const RelocalizerScene& scene)
       slice_(scene.camera.size().width),
       map_may_be_wrong_(states_errors(scene.index.map())) {}
 
-void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance) {
+void Relocalizer::begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance,
+                               bool start_was_wrong) {
   if (!workspace_) workspace_ = std::make_unique<Workspace>(scene_, motion_);
   prior_ = state;
   prior_covariance_ = covariance;
+  start_was_wrong_ = start_was_wrong;
   last_slice_ = 0;
   since_slice_ = {};
   elapsed_s_ = 0;
@@ -174,6 +175,8 @@ void Relocalizer::process_slice(const RelocalizerInput& input) {
     search_around_prior(input.T_body_cam, age_s);
   else
     update_hypotheses(input.T_body_cam, age_s);
+  if (start_was_wrong_ && !workspace_->widely && slices_ == kSlicesWithEdges - 1)
+    add_aliases(input.T_body_cam, age_s);
   if (searches_compete()) search_again(input.T_body_cam, age_s);
   since_slice_ = {};
   ++slices_;
@@ -220,29 +223,6 @@ bool Relocalizer::searches_compete() const {
   return wants_more_searches() && slices_ >= kSlicesWithEdges && slices_ < kLastCompeting;
 }
 
-/// A map that has few of the contours, and some where none are, lets wrong poses find support, and one search
-/// may miss the right one: what searches in other events find is added to the hypotheses.
-void Relocalizer::search_again(const Pose& T_body_cam, double age_s) {
-  go_on_with_velocity_found();
-  std::vector<PoseHypothesis> all = std::exchange(hypotheses_, {});
-  search_around_prior(T_body_cam, age_s);
-  if (hypotheses_.size() > kNewcomers) hypotheses_.resize(kNewcomers);
-  for (PoseHypothesis& h : hypotheses_) h.newest_search = draws_;
-  all.insert(all.end(), hypotheses_.begin(), hypotheses_.end());
-  hypotheses_ = std::move(all);
-  rank_hypotheses();
-  keep_hopeful();
-}
-
-/// The prior has gone on with the velocity of the start, which may be wrong by metres per second.
-void Relocalizer::go_on_with_velocity_found() {
-  if (hypotheses_.empty() || hypotheses_.front().mean_concentration < kLowConcentration) return;
-  const Eigen::Vector3d off = hypotheses_.front().nav.velocity - prior_.velocity;
-  prior_.T_map_body.p += elapsed_s_ * off;
-  prior_.velocity += off;
-  velocity_sigma_m_s_ = kFoundVelocitySpread_m_s;
-}
-
 WidePrior Relocalizer::wide_prior() const {
   WidePrior out{prior_.T_map_body, prior_covariance_,
                 since_slice_.dt_s > 0 ? Eigen::Vector3d(since_slice_.dq.conjugate() * since_slice_.dv)
@@ -261,9 +241,7 @@ void Relocalizer::search_widely(const Pose& T_body_cam, double age_s) {
 void Relocalizer::add_hypothesis(const PoseGuess& guess, const Eigen::Vector3d& velocity,
                                  const Pose& T_body_cam, double age_s) {
   // The slice shows where the body was age_s ago.
-  PoseHypothesis h{
-      {{guess.T_map_body.q * so3::exp(age_s * angular_rate_), guess.T_map_body.p + age_s * velocity},
-       velocity}};
+  PoseHypothesis h{{carried_on(guess.T_map_body, velocity, angular_rate_, age_s), velocity}};
   if (hypotheses_.size() < kRefined)
     workspace_->refiner.refine(h, T_body_cam, std::min(slices_, kSlicesWithEdges));
   h.mean_concentration = h.concentration;
@@ -329,8 +307,7 @@ PoseHypothesis Relocalizer::corrected_by_edges(const PoseHypothesis& predicted, 
   PoseHypothesis out = predicted;
   out.concentration = out.support = 0;
   const Eigen::Vector3d rate = motion_.angular_rate(predicted, angular_rate_);
-  const Pose& now = predicted.nav.T_map_body;
-  const Pose then{now.q * so3::exp(-age_s * rate), now.p - age_s * predicted.nav.velocity};
+  const Pose then = carried_on(predicted.nav.T_map_body, predicted.nav.velocity, rate, -age_s);
   Vector6d information;
   information.head<3>().setConstant(1 / predicted.position_variance);
   information.tail<3>().setConstant(1 / (predicted.rotation_variance + std::pow(kEdgeRotationSigma_rad, 2)));

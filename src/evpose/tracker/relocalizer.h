@@ -56,8 +56,11 @@ class Relocalizer {
 
   explicit Relocalizer(const RelocalizerScene& scene);
 
-  /// Begins a search around `state`; covariance of its pose as Pose::plus.
-  void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance);
+  /// Begins a search around `state`; covariance of its pose as Pose::plus. `start_was_wrong`: the covariance
+  /// of a pose that was given did not hold, so that the true one may be metres away; where places repeat,
+  /// poses that far off compete.
+  void begin_search(TimeNs t, const NavState& state, const Matrix6d& covariance,
+                    bool start_was_wrong = false);
   bool searching() const { return searching_; }
   /// The pose is not where it was searched, at any width of the search.
   bool has_tried_all() const;
@@ -107,6 +110,7 @@ class Relocalizer {
   bool searches_compete() const;
   void search_again(const Pose& T_body_cam, double age_s);
   void go_on_with_velocity_found();
+  void add_aliases(const Pose& T_body_cam, double age_s);
   void rank_hypotheses();
   void keep_hopeful();
   void search_widely(const Pose& T_body_cam, double age_s);
@@ -135,8 +139,9 @@ class Relocalizer {
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   double velocity_sigma_m_s_ = 0;  ///< of the prior, with which it may have gone off
   int slices_ = 0, searches_ = 0;
-  int draws_ = 0;          ///< of poses around the prior, since begin_search()
-  bool map_may_be_wrong_;  ///< it states errors of its contours
+  int draws_ = 0;                 ///< of poses around the prior, since begin_search()
+  bool start_was_wrong_ = false;  ///< poses far outside of the prior compete
+  bool map_may_be_wrong_;         ///< it states errors of its contours
 };
 
 }  // namespace evpose

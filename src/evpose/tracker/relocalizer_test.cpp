@@ -111,7 +111,7 @@ class RelocalizerLaws : public ::testing::Test {
     Matrix6d covariance = Matrix6d::Zero();
     covariance.diagonal().head<3>().setConstant(sigma_m * sigma_m);
     covariance.diagonal().tail<3>().setConstant(sigma_rad * sigma_rad);
-    relocalizer.begin_search(time(start.t_s), {start.T_map_body}, covariance);
+    relocalizer.begin_search(time(start.t_s), {start.T_map_body}, covariance, start_was_wrong_);
     for (int i = 0; i * kUpdate_s < seconds; ++i) {
       const double from_s = start.t_s + i * kUpdate_s, to_s = from_s + kUpdate_s;
       const ImuIncrement motion = motion_between(from_s, to_s);
@@ -205,7 +205,8 @@ class RelocalizerLaws : public ::testing::Test {
   VisibleSetConfig visible_;
   EventRegistrationConfig registration_;
   Pose T_body_cam_ = test_flight::camera_on_body();
-  double covered_s_ = 0;  ///< of a search: without events of the image's right third
+  double covered_s_ = 0;          ///< of a search: without events of the image's right third
+  bool start_was_wrong_ = false;  ///< likewise: the search knows that
 };
 
 TEST_F(RelocalizerLaws, FindsThePoseFromPoorStartsWithinItsSigmas) {
@@ -290,6 +291,22 @@ TEST_F(RelocalizerLaws, MotionDecidesBetweenPosesThatExplainedTheEventsAlike) {
   const Outcome outcome = search(between_twins(), 0.1, 0.01, map, 2 * covered_s_);
   EXPECT_TRUE(outcome.within_sigmas()) << outcome.position_error_m();
   EXPECT_GT(outcome.t_s, between_twins().t_s + covered_s_);
+}
+
+TEST_F(RelocalizerLaws, NearAStartThatWasWrongTheTruePoseIsFoundWhereThePlaceRepeats) {
+  const Eigen::Vector3d period(0, 1.1, 0);
+  PoorStart start(1);
+  start.T_map_body = pose_at(start.t_s);
+  start.T_map_body.p += period;
+  const ContourMap map = test_flight::with_twins(*world_, period, 2);
+  const Outcome alias = search(start, 0.05, 0.01, map, 0.25);
+  ASSERT_TRUE(alias.found);
+  EXPECT_NEAR(alias.position_error_m(), period.norm(), 0.05);
+  start_was_wrong_ = true;
+  const Outcome outcome = search(start, 0.05, 0.01, map, 0.5);
+  EXPECT_TRUE(outcome.within_sigmas())
+      << "found " << outcome.found << ", off by " << outcome.position_error_m() << " m, candidates "
+      << outcome.candidates.size();
 }
 
 TEST_F(RelocalizerLaws, TheTrackerTellsWhichPosesAreAmbiguous) {

@@ -63,7 +63,8 @@ TEST_F(PoseLaws, CompositionActsLikeMatrices) {
 TEST_F(PoseLaws, MinusUndoesPlus) {
   const Pose a = pose();
   Vector6d d;
-  d << vector(1), vector(0.5);
+  d.head<3>() = vector(1);
+  d.tail<3>() = vector(0.5);
   EXPECT_LT((a.plus(d).minus(a) - d).norm(), 1e-12);
 }
 

@@ -38,7 +38,7 @@ BENCHMARKS = {
     "smooth": ("smooth", "make", "the smoother beside the filter; wants the flights of unseen", "15 min"),
     "relocalization": ("experiments", "make_relocalization", "what cannot be tracked: other maps, mirrored ones, starts 3 m off, noise", "10 min"),
     "probability": ("probability", "make", "whether poses are right: what is told and what is; wants the flights of unseen", "40 min"),
-    "starts": ("starts", "make", "40 starts of each kind on shared and unseen recordings, 5 in maps of clouds; wants the flights of unseen", "2 h"),
+    "starts": ("starts", "make", "40 starts of each kind on shared and unseen recordings, with true contours and maps of clouds; wants the flights of unseen", "6 h"),
     "kidnapping": ("experiments", "make_kidnapping", "live sessions whose data stop while the camera moves on", "5 min"),
     "faults": ("experiments", "make_faults", "replays with faults in the streams", "10 min"),
     "events": ("experiments", "make_events", "causes of the events that are used", "10 min"),

@@ -8,6 +8,7 @@
 
 #include "evpose/core/config.h"
 #include "evpose/core/log.h"
+#include "evpose/tracker/hypothesis_choice.h"
 #include "evpose/tracker/tracker_parts.h"
 
 namespace evpose {
@@ -35,21 +36,13 @@ constexpr double kHopefulShare = 0.5;  // of the best one's support, with which 
 constexpr double kNewestWeight = 0.4;  // of the newest slice in the means
 constexpr double kLeastStep_s = 1e-3, kFirstRateGain = 1, kRateGain = 0.5;  // without a gyroscope
 
-// Acceptance. Wrong poses reach the concentration of the true one, not its support.
-constexpr int kLeastSlices = 4;  // before a pose is accepted
-constexpr int kMostSlices = 10;  // then the search starts anew
-constexpr double kLeastConcentration = 0.42;
-constexpr double kLeastLead = 1.15;       // over the next pose, in support
-constexpr double kRivalLead = 1.5;        // over one that is concentrated, too,
-constexpr int kRivalSlices = 12;          // so soon it may not have come to its place; in a true map
-constexpr double kLeastExplained = 0.06;  // of all events, beyond an even spread; wide searches
-constexpr double kClearLead = 2, kAloneConcentration = 0.22;  // so far ahead, that is enough; even: 0.15
-constexpr double kRival_m = 0.02, kRival_rad = 0.007;  // a pose nearer than this to the best is no rival
-
-// Searches that compete, each in events of its own: a pose is believed that several of them have found.
-constexpr int kLastCompeting = 5;  // slices, from the third on
-constexpr std::size_t kMostTogether = 10;
-constexpr int kFoundBy = 2;
+// Acceptance; see is_clear().
+constexpr int kLeastSlices = 4;            // before a pose is accepted
+constexpr int kMostSlices = 10;            // then the search starts anew
+constexpr int kRivalSlices = 12;           // so soon one may not have come to its place; in a true map
+constexpr double kLeastExplained = 0.06;   // of all events, beyond an even spread; wide searches
+constexpr int kLastCompeting = 5;          // slice in which searches compete, from the third on
+constexpr std::size_t kMostTogether = 10;  // hypotheses, then
 
 VisibleSetConfig points_to_search(VisibleSetConfig config) {
   config.stride_px = kPointStride_px;
@@ -57,15 +50,6 @@ VisibleSetConfig points_to_search(VisibleSetConfig config) {
   config.budget = kPoints;
   config.refresh_px = 0;  // chosen anew in each slice
   return config;
-}
-
-bool are_apart(const Pose& a, const Pose& b) {
-  const Vector6d d = a.minus(b);
-  return d.head<3>().norm() >= kRival_m || d.tail<3>().norm() >= kRival_rad;
-}
-
-double lead_over(const PoseHypothesis& other, bool soon) {
-  return soon && other.mean_concentration >= kLeastConcentration ? kRivalLead : kLeastLead;
 }
 
 }  // namespace
@@ -323,17 +307,8 @@ bool Relocalizer::explains_enough(const PoseHypothesis& h) const {
 
 bool Relocalizer::is_accepted(const PoseHypothesis& best) const {
   const bool compete = wants_more_searches();
-  const bool too_early = compete && (slices_ < kLastCompeting || best.found < kFoundBy);
-  if (too_early || !explains_enough(best)) return false;
-  const bool soon = slices_ < kRivalSlices && !map_may_be_wrong_;
-  bool leads = best.mean_concentration >= kLeastConcentration;
-  bool alone = best.mean_concentration >= kAloneConcentration && !compete;
-  for (const PoseHypothesis& h : hypotheses_) {
-    if (!are_apart(h.nav.T_map_body, best.nav.T_map_body)) continue;
-    leads &= best.mean_support >= lead_over(h, soon) * h.mean_support;
-    alone &= best.mean_support >= kClearLead * h.mean_support;
-  }
-  return leads || alone;
+  if ((compete && slices_ < kLastCompeting) || !explains_enough(best)) return false;
+  return is_clear(hypotheses_, {compete, slices_ < kRivalSlices && !map_may_be_wrong_});
 }
 
 std::vector<Pose> Relocalizer::candidates() const {

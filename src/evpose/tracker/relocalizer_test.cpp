@@ -229,19 +229,6 @@ TEST_F(RelocalizerLaws, InAMapThatMayBeWrongAPoseIsTakenThatSearchesInLaterEvent
   }
 }
 
-TEST(PoseHypotheses, ThoseThatHaveComeTogetherAreOneThatTheirSearchesHaveFound) {
-  std::vector<PoseHypothesis> all(4);
-  all[1].nav.T_map_body.p.x() = 1e-3;  // of the same search
-  all[2].nav.T_map_body.p.x() = 2e-3, all[2].newest_search = 2;
-  all[3].nav.T_map_body.p.x() = 0.1, all[3].newest_search = 2;
-  merge_duplicates(all);
-  ASSERT_EQ(all.size(), 2U);
-  EXPECT_EQ(all[0].found, 2);
-  EXPECT_EQ(all[0].newest_search, 2);
-  EXPECT_EQ(all[0].nav.T_map_body.p.x(), 0);
-  EXPECT_EQ(all[1].found, 1);
-}
-
 TEST_F(RelocalizerLaws, FindsThePoseFromMetresOffWithAnyHeading) {
   PoorStart start(2);
   ContourMap map = *world_;  // with something behind the flight: it is searched among the contours

@@ -60,7 +60,8 @@ class Flight {
       return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
     };
     Vector6d start;
-    start << draw(config.start_position_sigma_m), draw(config.start_rotation_sigma_rad);
+    start.head<3>() = draw(config.start_position_sigma_m);
+    start.tail<3>() = draw(config.start_rotation_sigma_rad);
     ekf_->start(0, {truth(0).plus(start), {0, 0, 0}}, {0, 0, 0});
   }
 

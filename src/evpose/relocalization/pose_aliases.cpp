@@ -29,7 +29,8 @@ std::vector<Step> scores_along(const Pose& from, const Eigen::Vector3d& axis, co
   std::vector<Step> out;
   const int half = static_cast<int>(kReach_m / kStep_m);
   for (int first = -half; first <= half; first += kStepsOfOneView) {
-    const SearchView view = view_from(moved(from, kStep_m * (first + kStepsOfOneView / 2) * axis));
+    const int middle = first + kStepsOfOneView / 2;
+    const SearchView view = view_from(moved(from, kStep_m * middle * axis));
     for (int i = first; i < first + kStepsOfOneView; ++i) {
       const Pose T = moved(from, kStep_m * i * axis);
       out.push_back(

@@ -92,7 +92,8 @@ def make(bench):
     true = {r.name: once(r, "true", in_true_map) for r in bench.peers()}
     true |= {f.name: once(f, "true", of_flight) for f in flights}
     built = {r.name: once(r, "built", in_built_map) for r in bench.peers()}
-    built |= {f.name: once(f, "built", of_flight, f.folder / "map.h5") for f in flights}
+    maps = {f: f.folder / "map.h5" for f in flights}
+    built |= {f.name: once(f, "built", of_flight, path) for f, path in maps.items() if path.exists()}
     return bench.write_page("starts", {
         "recordings": cells(true), "together": summary(true, seeds),
         "built": cells(built), "built together": summary(built, seeds, BUILT_LESS)}, harness.machine())
